@@ -1,0 +1,1 @@
+"""The device, in Amaranth: interpolators and the parts they are made of."""

