@@ -8,10 +8,8 @@ Source: design of the common contract; the words follow the lecture's block diag
 УУ) and, for more than two axes, its memory cells (DX, XT, KOX, with the axis letter in place of X).
 """
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from amaranth import Value
 from amaranth.hdl import signed
 from amaranth.lib import data, enum, wiring
 
@@ -27,6 +25,7 @@ __all__ = [
     "check_axes",
     "check_choice",
     "check_width",
+    "per_axis",
     "point_layout",
     "register_names",
     "step_layout",
@@ -83,11 +82,6 @@ def register_names(axes: int) -> dict[str, RegisterNames]:
 def per_axis(axes: int, shape: Any) -> data.StructLayout:
     """Lay out one ``shape`` for every axis, by axis letter."""
     return data.StructLayout(dict.fromkeys(AXIS_LETTERS[:axes], shape))
-
-
-def each(axes: int, make: Callable[[str], Value]) -> dict[str, Value]:
-    """Call ``make`` with every axis letter."""
-    return {letter: make(letter) for letter in AXIS_LETTERS[:axes]}
 
 
 def point_layout(width: int, axes: int) -> data.StructLayout:

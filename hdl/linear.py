@@ -41,14 +41,15 @@ class Linear(Part):
     more than two axes: DX…, XT…, KOX…, SX… with the axis's letter.
 
     Latency: a block accepted in clock 0 is prepared in clock 0, started in clock 1 and summed from
-    clock 2 on; the carry of a summation is a step in the next clock. A block is done T + 2 clocks
-    after its acceptance when no step has to wait, T the number of summations.
+    clock 2 on; the carry of a summation is a step in the next clock. The last step leaves T + 2
+    clocks after the block's acceptance when no step has to wait, T the number of summations, and
+    ``done`` follows it by one clock.
 
     Throughput: one summation a clock. T ≤ M without ``normalize`` (just M with preload 0), T ≤ M /
     2^s = 2^bitlen(max Δ) with it: between 1 and 2 clocks a step of the longest axis. The next block
     is prepared while this one runs and is started in the very clock in which the last step is
     taken: no clock is lost between that and its first summation. A block of no length and a
-    rejected block take one clock.
+    rejected block take one clock, and one more behind a block that moved.
 
     Steps: ``steps`` holds a step until it is taken and the summators wait for it. ``position``
     shows the steps taken, not the one that waits; starting a block loads it with the block's start.
@@ -112,7 +113,6 @@ class Linear(Part):
 
         self.names = register_names(axes)
         self.input = QuadrantInput(width, axes)
-        self.normalizer = Normalizer(width, axes)
         self.uu = ControlUnit()
         self.output = QuadrantOutput(axes)
         self.increment: dict[str, IncrementRegister] = {}
@@ -152,9 +152,9 @@ class Linear(Part):
         m.submodules.output = out
         scaled = inp.delta
         if self.normalize:
-            m.submodules.normalizer = self.normalizer
-            m.d.comb += self.normalizer.increments.eq(inp.delta)
-            scaled = self.normalizer.normalized
+            m.submodules.normalizer = normalizer = Normalizer(self.width, self.axes)
+            m.d.comb += normalizer.increments.eq(inp.delta)
+            scaled = normalizer.normalized
 
         ending = Signal(self.axes)
         m.d.comb += [

@@ -30,11 +30,13 @@ class QuadrantInput(Part):
     Keeps ``start`` and works out, for every axis, ``delta`` = \\|end − start\\| and ``negative``
     (end < start): as seen by the device every block runs into the first quadrant. ``fault`` is
     ``RANGE`` when a delta does not fit n bits. Both differences are subtracted at once and the one
-    that is not negative is chosen, so a single carry chain lies between the registers.
+    that is not negative is chosen, so a single carry chain lies between the registers. ``empty`` is
+    1 when every delta is 0 (with a fault it says nothing).
 
     Latency: a block accepted in one clock is ``pending`` in the next. Throughput: one block a clock
     while ``idle``; otherwise one block ahead of the running one. ``take`` gives the prepared block
-    away. Reset: nothing pending. Overflow: reported by ``fault``. Error: none, it is exact.
+    away, and must be given whenever ``idle`` meets ``pending``: the next block may come then.
+    Reset: nothing pending. Overflow: reported by ``fault``. Error: none, it is exact.
     Source: lecture, circular interpolation ("all other cases are brought to this one by suitable
     processing of the input and the output data") and step 2 (DX = XK − XH, KOX = DX).
 

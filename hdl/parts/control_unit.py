@@ -1,6 +1,6 @@
 """The control unit (УУ): start, run, wait, end."""
 
-from amaranth import Module, Signal
+from amaranth import Module, Mux, Signal
 from amaranth.lib.wiring import In, Out
 
 from discreta.hdl.contract import ErrorCode, Part
@@ -12,20 +12,24 @@ class ControlUnit(Part):
     """Starts a block, gives the summators their clock pulses, waits for steps to be taken, ends.
 
     - ``start`` (старт): the prepared block is taken over in this clock. That needs ``pending``, no
-      block running, and no step waiting that is not taken in this very clock. Nothing is loaded
-      when the block has a ``fault``; it is dropped with ``error`` instead.
-    - ``clock`` (a clock pulse for the summators): a block runs and no step waits, or the waiting
-    one
-      is taken in this clock.
+      block running, and no step waiting that is not taken in this very clock. A block with nothing
+      to sum, because it is ``empty`` (of no length) or has a ``fault``, waits until no step waits
+      at all, so that its answer comes after that of the block before. Nothing is loaded (``load``)
+      when it has a fault.
+    - ``clock`` (a clock pulse for the summators): a block runs and no step waits, or the one that
+      waits is taken in this clock.
     - A block ends with the summation after which no axis has steps left (``ending``). Its last step
       then waits with nothing running: that is how ``last`` is known.
-    - ``done`` (край) is 1 for the one clock after the last step was taken, or after the start of a
-      block of no length; ``error`` holds a code for the one clock after the start of a block with a
-      fault. Every block that is started is answered by exactly one of the two.
+    - ``done`` (край) is 1 for the one clock after the last step was taken, or after the start of an
+      empty block; ``error`` holds a code for the one clock after the start of a block with a fault.
+      Every block that is started is answered by exactly one of the two, in order, and never two
+      blocks in one clock.
+    - ``idle``: no block runs and no step waits. ``busy``: a block is pending or it is not idle.
 
     Latency: ``start``, ``load``, ``clock``, ``taken`` and ``last`` in the same clock, ``done`` and
-    ``error`` in the next. Throughput: a summation a clock; a block of no length or with a fault
-    takes one clock. Reset: nothing runs. Overflow, error bound: it counts nothing.
+    ``error`` in the next. Throughput: a summation a clock; an empty block or one with a fault takes
+    a clock, and one more behind a block that moved. Reset: nothing runs. Overflow, error bound: it
+    counts nothing.
     Source: lecture, УУ in the block diagrams; exercise 3, figure 3.3 (the step waits for the pulse
     of the speed-setting block, and the next point is computed when it comes).
     """
@@ -62,7 +66,9 @@ class ControlUnit(Part):
         m.d.comb += [
             free.eq(~self.waiting | self.ready),
             sound.eq(self.fault == ErrorCode.NONE),
-            self.start.eq(self.pending & ~self.running & free),
+            self.start.eq(
+                self.pending & ~self.running & Mux(self.empty | ~sound, ~self.waiting, free)
+            ),
             self.load.eq(self.start & sound),
             self.clock.eq(self.running & free),
             self.taken.eq(self.waiting & self.ready),

@@ -52,7 +52,7 @@ class Linear:
         """What the summators start from."""
         return {"zero": 0, "half": 2 ** (self.width - 1)}[self.preload]
 
-    def _names(self, a: str) -> tuple[str, str, str, str]:
+    def names(self, a: str) -> tuple[str, str, str, str]:
         """Name an axis's increment, position, remaining count and summator."""
         if self.axes > 2:
             return f"d{a}", f"{a}t", f"ko{a}", f"s{a}"
@@ -63,7 +63,7 @@ class Linear:
         n = self.width
         kinds: dict[str, tuple[int, bool]] = {}
         for a in self.letters:
-            increment, position, remaining, summator = self._names(a)
+            increment, position, remaining, summator = self.names(a)
             kinds |= {
                 increment: (n, False),
                 position: (n + 1, True),
@@ -80,7 +80,7 @@ class Linear:
     def reset(self) -> State:
         """Give the state after reset."""
         state: State = dict.fromkeys(self.registers(), 0)
-        return state | {self._names(a)[3]: self.initial_sum for a in self.letters}
+        return state | {self.names(a)[3]: self.initial_sum for a in self.letters}
 
     def outputs(self, state: State) -> dict[str, Value]:
         """Give what the ports show in a state."""
@@ -97,7 +97,7 @@ class Linear:
         for a in self.letters:
             pulse, direction = state[f"pulse_{a}"], state[f"direction_{a}"]
             out[f"steps_{a}"] = where(pulse, where(direction, -1, 1), 0)
-            out[f"position_{a}"] = state[self._names(a)[1]]
+            out[f"position_{a}"] = state[self.names(a)[1]]
         return out
 
     def step(self, state: State, inputs: dict[str, Value]) -> State:
@@ -108,7 +108,12 @@ class Linear:
         waiting = self._waiting(state)
         taken = waiting & inputs["steps_ready"]
         free = negate(waiting) | inputs["steps_ready"]
-        start = state["pending"] & negate(state["running"]) & free
+        empty: Value = 1
+        for a in self.letters:
+            empty = empty & equal(state[f"delta_{a}"], 0)
+        # A block with nothing to sum lets the step before it go first: one answer a clock.
+        next_may = where(empty | state["fault"], negate(waiting), free)
+        start = state["pending"] & negate(state["running"]) & next_may
         load = start & negate(state["fault"])
         clock = state["running"] & free
         accept = inputs["blocks_valid"] & self.outputs(state)["blocks_ready"]
@@ -116,10 +121,9 @@ class Linear:
         after: State = {}
         increments = self._increments(state)
         steps_left: Value = 0
-        length: Value = 0
         fault: Value = 0
         for a in self.letters:
-            increment, position, remaining, summator = self._names(a)
+            increment, position, remaining, summator = self.names(a)
 
             # Lecture, steps 8 to 10: add, look for a carry, move, count down.
             total = state[summator] + state[increment]
@@ -141,7 +145,6 @@ class Linear:
             after[remaining] = where(load, state[f"delta_{a}"], after[remaining])
             after[summator] = where(load, self.initial_sum, after[summator])
             after[f"direction_{a}"] = where(load, state[f"negative_{a}"], direction)
-            length = length | state[f"delta_{a}"]
 
             # Input processing: a block is brought into the first quadrant.
             begin = inputs[f"blocks_start_{a}"]
@@ -154,7 +157,6 @@ class Linear:
             after[f"negative_{a}"] = where(accept, negative, state[f"negative_{a}"])
 
         finished = clock & equal(steps_left, 0)
-        empty = equal(length, 0)
         after["running"] = where(load, negate(empty), where(finished, 0, state["running"]))
         after["done"] = (taken & negate(state["running"])) | (load & empty)
         after["error"] = start & state["fault"]

@@ -1,0 +1,1 @@
+"""What is proven of every method beyond its equality to the golden model."""

@@ -1,0 +1,267 @@
+"""The device and its golden model as bit-vectors: what the solver is asked.
+
+The RTL goes through Yosys to SMT-LIB and is read back by Z3; the golden model's own source runs on
+Z3 bit-vectors. Needs the ``prove`` extra.
+"""
+
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import z3
+from amaranth.back import rtlil
+
+from discreta.hdl.contract import Part
+from discreta.hdl.plain import PlainPorts
+
+__all__ = [
+    "Obligation",
+    "Rtl",
+    "Verdict",
+    "check",
+    "check_all",
+    "equivalence",
+    "extend",
+    "same",
+    "symbols",
+]
+
+#: Milliseconds after which the solver gives up on one obligation.
+TIMEOUT = 300_000
+
+
+@dataclass(frozen=True)
+class Obligation:
+    """Something to prove: under the assumptions the claims hold, whatever the symbols stand for.
+
+    Attributes
+    ----------
+    title : str
+        What a reader learns when it holds, in one line.
+    assumptions : list of z3.BoolRef
+    claims : list of z3.BoolRef
+        They are proven one by one.
+    arithmetic : bool
+        It speaks of unbounded numbers, not of bit-vectors.
+    """
+
+    title: str
+    assumptions: list
+    claims: list[z3.BoolRef]
+    arithmetic: bool = False
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How the proof of an obligation ended.
+
+    Attributes
+    ----------
+    title : str
+    holds : bool
+    seconds : float
+    counterexample : str
+        Empty when it holds; else the values that break it, or that the solver gave up.
+    """
+
+    title: str
+    holds: bool
+    seconds: float
+    counterexample: str
+
+
+def check(obligation: Obligation) -> Verdict:
+    """Prove an obligation or find values that break it."""
+    began = time.perf_counter()
+    counterexample = ""
+    for claim in obligation.claims:
+        # Bits at once to an and-inverter graph: 60 times as fast as the default on a normalizer.
+        bits = z3.Then("simplify", "propagate-values", "solve-eqs", "bit-blast", "aig", "sat")
+        solver = z3.Solver() if obligation.arithmetic else bits.solver()
+        solver.set("timeout", TIMEOUT)
+        solver.add(*obligation.assumptions, z3.Not(claim))
+        answer = solver.check()
+        if answer == z3.sat:
+            counterexample = _values(solver.model())
+        elif answer == z3.unknown:
+            counterexample = f"the solver gave up: {solver.reason_unknown()}"
+        if counterexample:
+            break
+    seconds = time.perf_counter() - began
+    return Verdict(obligation.title, not counterexample, seconds, counterexample)
+
+
+def _values(model: z3.ModelRef) -> str:
+    values = sorted(
+        f"{symbol.name()}={value}"
+        for symbol in model.decls()
+        if symbol.arity() == 0
+        and isinstance(value := model[symbol], z3.BitVecNumRef | z3.IntNumRef | z3.RatNumRef)
+    )
+    return ", ".join(values) or "(no values)"
+
+
+def check_all(obligations: list[Obligation], seen: Callable[[Verdict], None]) -> bool:
+    """Prove one obligation after the other, report every verdict, and say whether all hold."""
+    verdicts = []
+    for obligation in obligations:
+        verdicts.append(check(obligation))
+        seen(verdicts[-1])
+    return all(verdict.holds for verdict in verdicts)
+
+
+def extend(value: z3.BitVecRef, signed: bool, width: int) -> z3.BitVecRef:
+    """Widen a bit-vector to ``width`` bits, keeping its value."""
+    extra = width - value.size()
+    return z3.SignExt(extra, value) if signed else z3.ZeroExt(extra, value)
+
+
+def symbols(kinds: dict[str, tuple[int, bool]], width: int, suffix: str = "") -> dict:
+    """Make a symbol for every (width, signed) kind, widened to ``width`` bits."""
+    return {
+        name: extend(z3.BitVec(name + suffix, bits), signed, width)
+        for name, (bits, signed) in kinds.items()
+    }
+
+
+class Rtl:
+    """One clock of a device, all registers and inputs symbolic.
+
+    Symbols are named after the plain ports and registers: ``sx`` before the clock, ``sx'`` after
+    it.
+
+    Parameters
+    ----------
+    core : Part
+        The interpolator.
+
+    Attributes
+    ----------
+    transition : list of z3.BoolRef
+        What ties the symbols together: the device makes one clock.
+    inputs, outputs, registers : dict of str to (width, signed)
+        The plain ports without ``rst``, and the registers.
+    flip_flops : int
+        Bits of state that Yosys found, named or not.
+    """
+
+    def __init__(self, core: Part):
+        top = PlainPorts(core, observe=True)
+        self.inputs = _kinds(top.inputs)
+        self.registers = _kinds(core.registers)
+        self.outputs = {
+            name: kind for name, kind in _kinds(top.outputs).items() if not name.startswith("reg_")
+        }
+        text = _smt2(rtlil.convert(top, name="design", emit_src=False))
+        self.flip_flops = sum(_register_bits(text))
+        lines = [text]
+        for state, mark in (("before", ""), ("after", "'")):
+            lines.append(f"(declare-fun |{state}| () |design_s|)")
+            observed = [(name, name, kind) for name, kind in (self.inputs | self.outputs).items()]
+            observed += [(f"reg_{name}", name, kind) for name, kind in self.registers.items()]
+            observed.append(("rst", "rst", (1, False)))
+            for port, name, (bits, _) in observed:
+                # An output that is a register too, such as `done`, is named once for each.
+                symbol = f"out.{name}{mark}" if port in self.outputs else f"{name}{mark}"
+                value = f"(|design_n {port}| |{state}|)"
+                if bits == 1:
+                    value = f"(ite {value} #b1 #b0)"
+                lines.append(f"(declare-fun |{symbol}| () (_ BitVec {bits}))")
+                lines.append(f"(assert (= |{symbol}| {value}))")
+        lines.append("(assert (|design_t| |before| |after|))")
+        self.transition = list(z3.parse_smt2_string("\n".join(lines)))
+
+    @property
+    def rst(self) -> z3.BitVecRef:
+        """The reset input."""
+        return z3.BitVec("rst", 1)
+
+
+def _kinds(signals) -> dict[str, tuple[int, bool]]:
+    return {name: (len(signal), signal.shape().signed) for name, signal in signals.items()}
+
+
+def _register_bits(text: str) -> Iterator[int]:
+    for line in text.splitlines():
+        if line.startswith("; yosys-smt2-register "):
+            yield int(line.split()[3])
+
+
+def _smt2(rtlil_text: str) -> str:
+    """Write a design in RTLIL as SMT-LIB; in a process of its own, since Yosys talks on stdout."""
+    commands = [
+        "read_rtlil design.il",
+        "proc",
+        "flatten",
+        "opt -full",
+        "async2sync",
+        "dffunmap",
+        "write_smt2 -bv design.smt2",
+    ]
+    script = "import sys; from pyosys import libyosys as ys; d = ys.Design()\n"
+    script += "for command in sys.argv[1:]: ys.run_pass(command, d)"
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "design.il").write_text(rtlil_text)
+        subprocess.run(
+            [sys.executable, "-c", script, *commands],
+            cwd=folder,
+            check=True,
+            capture_output=True,
+        )
+        return Path(folder, "design.smt2").read_text()
+
+
+def equivalence(core: Part, golden: Any) -> list[Obligation]:
+    """State that a device and its golden model are the same machine.
+
+    Every register and input is a symbol, so what is shown holds in every state, reachable or not.
+
+    Parameters
+    ----------
+    core : Part
+        The interpolator.
+    golden : object
+        Its model: ``registers()``, ``reset()``, ``outputs(state)`` and ``step(state, inputs)``.
+    """
+    rtl = Rtl(core)
+    named = sum(bits for bits, _ in rtl.registers.values())
+    width = max(bits for bits, _ in rtl.inputs.values()) + 4
+    state, inputs = symbols(rtl.registers, width), symbols(rtl.inputs, width)
+    outputs = {
+        name: extend(z3.BitVec(f"out.{name}", bits), signed, width)
+        for name, (bits, signed) in rtl.outputs.items()
+    }
+    after = symbols(rtl.registers, width, "'")
+    return [
+        Obligation(
+            f"no hidden state: {rtl.flip_flops} flip-flops, all of them in {len(rtl.registers)} "
+            "named registers of the golden model",
+            [],
+            [z3.BoolVal(rtl.flip_flops == named and rtl.registers == golden.registers())],
+        ),
+        Obligation(
+            "RTL = golden: every register after one clock, for all states and inputs",
+            [*rtl.transition, rtl.rst == 0],
+            same(after, golden.step(state, inputs)),
+        ),
+        Obligation(
+            "RTL = golden: every output, for all states",
+            rtl.transition,
+            same(outputs, golden.outputs(state)),
+        ),
+        Obligation(
+            "reset: one clock with rst leads from every state to the golden reset state",
+            [*rtl.transition, rtl.rst == 1],
+            same(after, golden.reset()),
+        ),
+    ]
+
+
+def same(values: dict, expected: dict) -> list[z3.BoolRef]:
+    """State that two sets of named values agree."""
+    return [values[name] == expected[name] for name in values]
