@@ -78,8 +78,12 @@ class Linear(Part):
 
     Attributes
     ----------
+    parameters : dict of str to object
+        The parameters it was made with.
+    diagram : dict of str to list of Signal
+        Every register there is, grouped as in the block diagram, by the group's title.
     registers : dict of str to Signal
-        Every register there is, by its name in waveforms.
+        The same registers, by their names in waveforms.
 
     Raises
     ------
@@ -110,6 +114,12 @@ class Linear(Part):
         self.axes = axes
         self.normalize = normalize
         self.preload = preload
+        self.parameters: dict[str, object] = {
+            "width": width,
+            "axes": axes,
+            "normalize": normalize,
+            "preload": preload,
+        }
 
         self.names = register_names(axes)
         self.input = QuadrantInput(width, axes)
@@ -125,22 +135,27 @@ class Linear(Part):
             self.remaining[a] = RemainingCounter(width, name=names.remaining)
             self.summator[a] = Summator(width, preload=preload, name=names.summator)
 
+        inp, out, uu = self.input, self.output, self.uu
+        groups = {
+            "P1, P2 increments": [part.register for part in self.increment.values()],
+            "SX, SY summators": [part.register for part in self.summator.values()],
+            "P5, P6 steps left": [part.register for part in self.remaining.values()],
+            "P3, P4 position": [part.register for part in self.place.values()],
+            "УУ": [uu.running, uu.done_register, uu.error_register],
+            "step that waits": [*out.pulse_registers.values(), *out.direction_registers.values()],
+            "prepared block": [
+                inp.pending_register,
+                inp.fault_register,
+                *inp.start_registers.values(),
+                *inp.delta_registers.values(),
+                *inp.negative_registers.values(),
+            ],
+        }
+        self.diagram: dict[str, list[Signal]] = {
+            title: [Value.cast(register) for register in group] for title, group in groups.items()
+        }
         self.registers: dict[str, Signal] = {
-            signal.name: signal
-            for registers in (
-                [part.register for part in self.increment.values()],
-                [part.register for part in self.place.values()],
-                [part.register for part in self.remaining.values()],
-                [part.register for part in self.summator.values()],
-                [self.uu.running, self.uu.done_register, self.uu.error_register],
-                self.output.pulse_registers.values(),
-                self.output.direction_registers.values(),
-                [self.input.pending_register, self.input.fault_register],
-                self.input.start_registers.values(),
-                self.input.delta_registers.values(),
-                self.input.negative_registers.values(),
-            )
-            for signal in map(Value.cast, registers)
+            register.name: register for group in self.diagram.values() for register in group
         }
 
     def elaborate(self, platform):
@@ -192,7 +207,7 @@ class Linear(Part):
                 p_increment.initial.eq(scaled[a]),
                 p_position.initial.eq(inp.start[a]),
                 p_remaining.initial.eq(inp.delta[a]),
-                s.addend.eq(p_increment.register),
+                s.addend.eq(p_increment.value),
                 s.enable.eq(uu.clock & ~p_remaining.zero),
                 p_remaining.count.eq(s.carry),
                 out.carry[a].eq(s.carry),
@@ -200,6 +215,6 @@ class Linear(Part):
                 p_position.down.eq(out.down[a]),
                 ending[index].eq(p_remaining.ending),
                 self.steps.payload[a].eq(out.step[a]),
-                self.position[a].eq(p_position.register),
+                self.position[a].eq(p_position.value),
             ]
         return m

@@ -75,7 +75,7 @@ _GROUPS = {
 }
 
 
-def verilog(core: Part, name: str, parameters: dict[str, object]) -> str:
+def verilog(core: Part, name: str) -> str:
     """Give an interpolator as Verilog-2005, the same text on every machine.
 
     The registers keep their names and stand in one module for every part, ``<name>_p1`` and so on,
@@ -89,8 +89,6 @@ def verilog(core: Part, name: str, parameters: dict[str, object]) -> str:
     name : str
         Name of the top module, which has the ports of ``PlainPorts``: ``clk``, ``rst``, then the
         inputs and the outputs in the order of the interpolator's signature.
-    parameters : dict of str to object
-        What to print as the interpolator's parameters.
 
     Raises
     ------
@@ -114,7 +112,7 @@ def verilog(core: Part, name: str, parameters: dict[str, object]) -> str:
     # Only the top module has signed ports: it is wires alone, so that no expression changes its
     # meaning, and Yosys writes $signed where the other modules mean it.
     modules = [_module(first, ports), *(_module(text, {}) for text in others)]
-    return "\n\n".join([_header(top, name, parameters), *modules]) + "\n"
+    return "\n\n".join([_header(top, name), *modules]) + "\n"
 
 
 def _ports(top: PlainPorts) -> dict[str, tuple[str, Shape]]:
@@ -175,11 +173,11 @@ def _module(text: str, shapes: dict[str, tuple[str, Shape]]) -> str:
     return "\n".join([head.partition("(")[0].rstrip() + " (", header, ");", *body])
 
 
-def _header(top: PlainPorts, name: str, parameters: dict[str, object]) -> str:
+def _header(top: PlainPorts, name: str) -> str:
     """Write the comment at the top of the text."""
     first, *paragraphs = (inspect.getdoc(type(top.core)) or name).split("\n\n")
     timing = [text for text in paragraphs if text.startswith(("Latency", "Throughput"))]
-    values = ", ".join(f"{key} = {value}" for key, value in parameters.items())
+    values = ", ".join(f"{key} = {value}" for key, value in top.core.parameters.items())
     ports = _ports(top)
     room = max(map(len, ports))
     table = [f"{'port':{room}}  dir     bits           meaning"]

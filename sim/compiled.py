@@ -122,9 +122,15 @@ class CompiledModel:
                 assert self._call.bench_add(self._bench, kind, name.encode(), signed), name
         self.reset()
 
+    def close(self) -> None:
+        """Give the model's memory back."""
+        if self._bench is not None:
+            self._call.bench_destroy(self._bench)
+            self._bench = None
+
     def __del__(self):
         if hasattr(self, "_bench"):
-            self._call.bench_destroy(self._bench)
+            self.close()
 
     def reset(self) -> None:
         """Hold ``rst`` for one clock; clocks are counted from there."""

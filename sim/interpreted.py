@@ -80,8 +80,8 @@ class PysimModel:
             ran=ran,
             fed=self._fed,
             answered=self._answered,
-            events=np.array(events, dtype=np.int64).reshape(-1, columns),
-            watch=np.array(self._rows, dtype=np.int64).reshape(-1, len(self.watch)),
+            events=np.array(events, dtype=np.int64).reshape(len(events), columns),
+            watch=np.array(self._rows, dtype=np.int64).reshape(len(self._rows), len(self.watch)),
         )
 
     async def _bench(self, ctx):

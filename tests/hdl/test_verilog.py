@@ -19,7 +19,7 @@ PARAMETERS = {"width": 8, "axes": 2, "normalize": True, "preload": "half"}
 
 @cache
 def emit() -> str:
-    return verilog(Linear(8, 2), "discreta_linear", PARAMETERS)
+    return verilog(Linear(8, 2), "discreta_linear")
 
 
 def test_same_bytes_in_every_folder_and_for_every_hash_seed(tmp_path):
@@ -27,7 +27,7 @@ def test_same_bytes_in_every_folder_and_for_every_hash_seed(tmp_path):
         "import sys\n"
         "from discreta.hdl.linear import Linear\n"
         "from discreta.hdl.verilog import verilog\n"
-        f"text = verilog(Linear(8, 2), 'discreta_linear', {PARAMETERS!r})\n"
+        "text = verilog(Linear(8, 2), 'discreta_linear')\n"
         "sys.stdout.buffer.write(text.encode())\n"
     )
     root = str(Path(discreta.__file__).parents[1])
@@ -42,8 +42,8 @@ def test_same_bytes_in_every_folder_and_for_every_hash_seed(tmp_path):
 
 def test_twice_from_one_core():
     top = PlainPorts(Linear(8, 2))
-    assert [verilog(top, "discreta_linear", PARAMETERS) for _ in range(2)] == [emit()] * 2
-    assert verilog(top.core, "discreta_linear", PARAMETERS) == emit()
+    assert [verilog(top, "discreta_linear") for _ in range(2)] == [emit()] * 2
+    assert verilog(top.core, "discreta_linear") == emit()
 
 
 def test_ports_of_the_top_module():
@@ -74,7 +74,7 @@ def test_ports_of_the_top_module():
 @pytest.mark.parametrize("axes", [2, 3, 6])
 @pytest.mark.parametrize("width", [4, 32])
 def test_hierarchy_and_registers(width, axes):
-    text = verilog(Linear(width, axes), "line", {})
+    text = verilog(Linear(width, axes), "line")
     golden = GoldenLinear(width, axes)
     parts = [name for name in golden.registers() if re.fullmatch(r"p\d|[ds].|.t|ko.", name)]
     modules = re.findall(r"^module (\w+) \($", text, re.MULTILINE)
@@ -110,7 +110,7 @@ def test_comment_at_the_top():
         assert word in comment
     rows = dict(line.removeprefix("// ").split(maxsplit=1) for line in lines[-18:])
     top = PlainPorts(Linear(8, 2))
-    verilog(top, "discreta_linear", {})
+    verilog(top, "discreta_linear")
     assert list(rows) == ["clk", "rst", *top.inputs, *top.outputs]
     assert rows["blocks_end_y"].split() == ["input", "9", "signed", "block:", "end", "y"]
     assert rows["steps_valid"].split()[:2] == ["output", "1"]
@@ -131,12 +131,12 @@ def test_text_names_no_machine_and_reads_anywhere():
 @pytest.mark.parametrize("name", ["", "1st", "a b", "a.b", "a$b", "a\n", "\\a", "длина"])
 def test_refuses_a_name_that_is_no_identifier(name):
     core = Linear(4, 2)
-    verilog(core, "line", {})
+    verilog(core, "line")
     with pytest.raises(ValueError, match=r"name of the module is .*: choose letters, digits and _"):
-        verilog(core, name, {})
+        verilog(core, name)
 
 
 @pytest.mark.parametrize("name", ["module", "initial", "logic"])
 def test_refuses_a_keyword(name):
     with pytest.raises(ValueError, match=rf"name of the module is '{name}', a keyword"):
-        verilog(Linear(4, 2), name, {})
+        verilog(Linear(4, 2), name)

@@ -25,7 +25,7 @@ def need(simulator: str) -> None:
 @cache
 def emit(width: int, axes: int, normalize: bool, preload: str) -> tuple[PlainPorts, str]:
     top = PlainPorts(Linear(width, axes, normalize=normalize, preload=preload))
-    return top, verilog(top, MODULE, {})
+    return top, verilog(top, MODULE)
 
 
 def blocks_of(width: int, axes: int, *, seed: int, longest: int) -> np.ndarray:
