@@ -196,10 +196,10 @@ class Linear(Part):
         ]
         for index, a in enumerate(AXIS_LETTERS[: self.axes]):
             names = self.names[a]
-            p_increment = m.submodules[names.increment] = self.increment[a]
-            p_position = m.submodules[names.position] = self.place[a]
-            p_remaining = m.submodules[names.remaining] = self.remaining[a]
-            s = m.submodules[names.summator] = self.summator[a]
+            p_increment = m.submodules[f"{names.increment}_register"] = self.increment[a]
+            p_position = m.submodules[f"{names.position}_register"] = self.place[a]
+            p_remaining = m.submodules[f"{names.remaining}_counter"] = self.remaining[a]
+            s = m.submodules[f"{names.summator}_summator"] = self.summator[a]
             m.d.comb += [
                 Cat(p_increment.load, p_position.load, p_remaining.load, s.load).eq(
                     uu.load.replicate(4)
@@ -207,7 +207,7 @@ class Linear(Part):
                 p_increment.initial.eq(scaled[a]),
                 p_position.initial.eq(inp.start[a]),
                 p_remaining.initial.eq(inp.delta[a]),
-                s.addend.eq(p_increment.value),
+                s.addend.eq(p_increment.register),
                 s.enable.eq(uu.clock & ~p_remaining.zero),
                 p_remaining.count.eq(s.carry),
                 out.carry[a].eq(s.carry),
@@ -215,6 +215,6 @@ class Linear(Part):
                 p_position.down.eq(out.down[a]),
                 ending[index].eq(p_remaining.ending),
                 self.steps.payload[a].eq(out.step[a]),
-                self.position[a].eq(p_position.value),
+                self.position[a].eq(p_position.register),
             ]
         return m

@@ -11,6 +11,9 @@ from discreta.hdl.contract import Part
 
 __all__ = ["write_view"]
 
+#: Where pysim puts the interpolator.
+_CORE = ["bench", "top", "core"]
+
 #: Height of a curve, in rows of GTKWave.
 _CURVE_ROWS = 4
 
@@ -29,11 +32,11 @@ def write_view(view: IO[str], vcd: Path, shown_as: str, core: Part) -> None:
     core : Part
         The interpolator, with its ``diagram``.
     """
-    names = _deepest(vcd)
+    names = _inside(vcd)
     ports = _ports(vcd)
     save = GTKWSave(view)
     save.dumpfile(shown_as, abspath=False)
-    save.treeopen("bench.top.core.")
+    save.treeopen(".".join(_CORE) + ".")
     save.signals_width(220)
     save.trace("bench.top.clk")
     with save.group("blocks and steps"):
@@ -75,10 +78,11 @@ def _variables(vcd: Path) -> Iterator[tuple[list[str], str, str]]:
                 return
 
 
-def _deepest(vcd: Path) -> dict[str, str]:
-    """Give every variable by its name; of several, the innermost, which is the register itself."""
-    found = sorted(_variables(vcd), key=lambda variable: len(variable[0]))
-    return {name: path for _, name, path in found}
+def _inside(vcd: Path) -> dict[str, str]:
+    """Give every variable of the interpolator by its name; of several, the one nearest its top."""
+    inside = [variable for variable in _variables(vcd) if variable[0][:3] == _CORE]
+    inside.sort(key=lambda variable: -len(variable[0]))
+    return {name: path for _, name, path in inside}
 
 
 def _ports(vcd: Path) -> dict[str, str]:

@@ -1,7 +1,7 @@
 """The increment register (P1, P2)."""
 
 from amaranth import Module, Signal
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In
 
 from discreta.hdl.contract import Part, check_width
 
@@ -11,7 +11,7 @@ __all__ = ["IncrementRegister"]
 class IncrementRegister(Part):
     """Keeps the increment that the summator adds at every summation.
 
-    Latency: ``value`` shows ``initial`` one clock after ``load``. Throughput: a load a clock.
+    Latency: ``register`` shows ``initial`` one clock after ``load``. Throughput: a load a clock.
     Reset: 0. Overflow: none, the value is only kept. Error: none.
     Source: lecture, block diagram of the linear interpolator (P1 = ΔX, P2 = ΔY).
 
@@ -30,13 +30,12 @@ class IncrementRegister(Part):
 
     def __init__(self, width: int, *, name: str = "increment"):
         check_width(width)
-        super().__init__({"load": In(1), "initial": In(width), "value": Out(width)})
+        super().__init__({"load": In(1), "initial": In(width)})
         self.register = Signal(width, name=name)
 
     def elaborate(self, platform):
         """Describe the hardware."""
         m = Module()
-        m.d.comb += self.value.eq(self.register)
         with m.If(self.load):
             m.d.sync += self.register.eq(self.initial)
         return m

@@ -2,7 +2,7 @@
 
 from amaranth import Module, Signal
 from amaranth.hdl import signed
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In
 
 from discreta.hdl.contract import Part, check_width
 
@@ -12,7 +12,7 @@ __all__ = ["PositionRegister"]
 class PositionRegister(Part):
     """The coordinate of an axis now: an up/down counter.
 
-    Latency: ``value`` follows ``load``, ``up`` or ``down`` at the clock's edge. ``load`` goes
+    Latency: ``register`` follows ``load``, ``up`` or ``down`` at the clock's edge. ``load`` goes
     before counting; ``up`` and ``down`` together leave the value as it is. Throughput: a step a
     clock.
     Reset: 0. Overflow: wraps; a block whose start and end are in range never makes it wrap, since
@@ -35,21 +35,12 @@ class PositionRegister(Part):
     def __init__(self, width: int, *, name: str = "position"):
         check_width(width)
         shape = signed(width + 1)
-        super().__init__(
-            {
-                "load": In(1),
-                "initial": In(shape),
-                "up": In(1),
-                "down": In(1),
-                "value": Out(shape),
-            }
-        )
+        super().__init__({"load": In(1), "initial": In(shape), "up": In(1), "down": In(1)})
         self.register = Signal(shape, name=name)
 
     def elaborate(self, platform):
         """Describe the hardware."""
         m = Module()
-        m.d.comb += self.value.eq(self.register)
         with m.If(self.load):
             m.d.sync += self.register.eq(self.initial)
         with m.Elif(self.up & ~self.down):
