@@ -352,6 +352,15 @@ def _numbers(golden: Linear) -> list[Obligation]:
             True,
         ),
     ]
+    if golden.normalize:
+        obligations.append(
+            Obligation(
+                "speed: L < T ≤ 2·L for the longest axis, so between 1 and 2 clocks a step",
+                [*block, 2 * p >= m, p < m],
+                [length < limit, limit <= 2 * length],
+                True,
+            )
+        )
     return obligations + _deviation(golden)
 
 

@@ -76,7 +76,13 @@ def test_ports_of_the_top_module():
 def test_hierarchy_and_registers(width, axes):
     text = verilog(Linear(width, axes), "line")
     golden = GoldenLinear(width, axes)
-    parts = [name for name in golden.registers() if re.fullmatch(r"p\d|[ds].|.t|ko.", name)]
+    kinds = {r"p[1-4]|d.|.t": "register", r"p[56]|ko.": "counter", r"s.": "summator"}
+    parts = [
+        f"{name}_{kind}"
+        for name in golden.registers()
+        for pattern, kind in kinds.items()
+        if re.fullmatch(pattern, name)
+    ]
     modules = re.findall(r"^module (\w+) \($", text, re.MULTILINE)
     own = ["line", *(f"line_{part}" for part in ("core", "input", "normalizer", "output", "uu"))]
     assert sorted(modules) == sorted([*own, *(f"line_{part}" for part in parts)])
