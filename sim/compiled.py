@@ -11,6 +11,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
@@ -114,27 +115,36 @@ class CompiledModel:
         self.step_fields = top.step_fields
         self._call = ctypes.CDLL(str(_library(top)))
         self._call.bench_create.restype = ctypes.c_void_p
-        self._bench = ctypes.c_void_p(self._call.bench_create())
         ports = top.inputs | top.outputs
-        for kind, names in enumerate((self.block_fields, self.step_fields, watch)):
-            for name in names:
-                signed = int(ports[name].shape().signed)
-                assert self._call.bench_add(self._bench, kind, name.encode(), signed), name
+        self._ports = [
+            (kind, name.encode(), int(ports[name].shape().signed))
+            for kind, names in enumerate((self.block_fields, self.step_fields, watch))
+            for name in names
+        ]
+        self._lanes: list[int] = []
+        self._bench = self._create()
         self.reset()
+
+    def _create(self) -> int:
+        bench = self._call.bench_create()
+        for kind, name, signed in self._ports:
+            if not self._call.bench_add(ctypes.c_void_p(bench), kind, name, signed):
+                raise ValueError(f"there is no port {name.decode()!r}")
+        return bench
 
     def close(self) -> None:
         """Give the model's memory back."""
-        if self._bench is not None:
-            self._call.bench_destroy(self._bench)
-            self._bench = None
+        for bench in [self._bench, *self._lanes]:
+            self._call.bench_destroy(ctypes.c_void_p(bench))
+        self._bench, self._lanes = 0, []
 
     def __del__(self):
-        if hasattr(self, "_bench"):
+        if getattr(self, "_bench", 0):
             self.close()
 
     def reset(self) -> None:
         """Hold ``rst`` for one clock; clocks are counted from there."""
-        self._call.bench_reset(self._bench)
+        self._call.bench_reset(ctypes.c_void_p(self._bench))
 
     def run(
         self,
@@ -176,7 +186,7 @@ class CompiledModel:
             event_room=event_room,
             watch=watch.ctypes.data if self.watch else None,
         )
-        self._call.bench_run(self._bench, ctypes.byref(request))
+        self._call.bench_run(ctypes.c_void_p(self._bench), ctypes.byref(request))
         return Stretch(
             ran=request.ran,
             fed=request.fed,
@@ -185,26 +195,35 @@ class CompiledModel:
             watch=watch[: request.ran],
         )
 
-    def lanes(self, blocks: np.ndarray, clocks: int, *, stalls: Stalls = NO_STALLS) -> np.ndarray:
-        """Run every block on its own, each from reset, for the same number of clocks.
+    def lanes(
+        self, blocks: np.ndarray, clocks: int, *, window: int = 0, stalls: Stalls = NO_STALLS
+    ) -> Iterator[np.ndarray]:
+        """Run every block on a copy of its own, each from reset, for the same number of clocks.
 
         Lane i stalls with the pattern of seed ``stalls.seed`` + i.
 
-        Returns
-        -------
-        array of int64, shape (blocks, clocks, watched signals)
+        Yields
+        ------
+        array of int64, shape (blocks, up to ``window`` clocks, watched signals)
+            One window of clocks after the other; all of them in one with ``window`` 0.
         """
         blocks = np.ascontiguousarray(blocks, dtype=np.int64)
         assert blocks.shape[1:] == (len(self.block_fields),)
-        watch = np.empty((len(blocks), clocks, len(self.watch)), dtype=np.int64)
+        while len(self._lanes) < len(blocks):
+            self._lanes.append(self._create())
+        handles = (ctypes.c_void_p * len(blocks))(*self._lanes[: len(blocks)])
         number = ctypes.c_uint64
-        self._call.bench_lanes(
-            self._bench,
-            number(len(blocks)),
-            number(clocks),
-            ctypes.c_void_p(blocks.ctypes.data),
-            number(stalls.seed),
-            number(stalls.stall_below),
-            ctypes.c_void_p(watch.ctypes.data),
-        )
-        return watch
+        window = window or clocks
+        for begin in range(0, clocks, window):
+            count = min(window, clocks - begin)
+            watch = np.empty((len(blocks), count, len(self.watch)), dtype=np.int64)
+            self._call.bench_lanes(
+                handles,
+                number(len(blocks)),
+                number(count),
+                ctypes.c_void_p(None if begin else blocks.ctypes.data),
+                number(stalls.seed),
+                number(stalls.stall_below),
+                ctypes.c_void_p(watch.ctypes.data),
+            )
+            yield watch

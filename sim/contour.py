@@ -50,8 +50,6 @@ class LineContour:
         The point of the largest error.
     ends_reached : int
         Blocks whose end point was reached exactly with their last step.
-    reverses : int
-        Steps against their block's own direction.
     """
 
     starts: np.ndarray
@@ -61,7 +59,6 @@ class LineContour:
     largest_error: float = 0.0
     error_at: tuple[int, ...] = ()
     ends_reached: int = 0
-    reverses: int = 0
     _moving: np.ndarray = field(init=False)
     _block: int = field(init=False, default=0)
     _accepted: int | None = field(init=False, default=None)
@@ -117,7 +114,6 @@ class LineContour:
             self.error_at = tuple(points[worst].tolist())
         self.steps += len(taken)
         self.clocks = int(clocks[-1])
-        self.reverses += int(np.count_nonzero(np.any(moves * (ends - starts) < 0, axis=1)))
         reached = np.all(points == ends, axis=1)
         self.ends_reached += int(np.count_nonzero(reached & (last == 1)))
         self._block = int(order[-1] + last[-1])

@@ -2,22 +2,43 @@
 
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 
-__all__ = ["FORMATS", "PathPlot"]
+from discreta.hdl.contract import AXIS_LETTERS
+from discreta.sim.points import BadInputError
+
+__all__ = ["FORMATS", "PathPlot", "picture_format"]
 
 FORMATS = (".png", ".svg")
 
-#: Points above which the picture takes every second one, again and again: no eye misses them.
-_ROOM = 1 << 17
+#: Points above which the staircase takes every second one, again and again: no eye misses them.
+_POINTS = 1 << 17
+
+#: Columns of the error's curve: with more steps each has the largest error of several.
+_COLUMNS = 1 << 11
+
+#: Half the side of the window at the largest error, in steps, and the steps kept around it.
+_SIDE, _NEAR = 7, 12
+
+
+def picture_format(name: str) -> str:
+    """Give the ending of a picture's name, which says its format.
+
+    Raises
+    ------
+    BadInputError
+        There is no such format.
+    """
+    ending = Path(name).suffix.lower()
+    if ending not in FORMATS:
+        raise BadInputError(f"--plot {name}: choose a name that ends in {' or '.join(FORMATS)}")
+    return ending
 
 
 class PathPlot:
     """Collects a path as it is stepped and draws it at the end.
 
-    The first two axes are drawn. Where the whole path is large against one step, a window shows the
-    place of the largest error step by step.
+    The first two axes are drawn. A window shows the place of the largest error step by step.
 
     Parameters
     ----------
@@ -26,84 +47,124 @@ class PathPlot:
     """
 
     def __init__(self, corners: np.ndarray):
+        self._axes = corners.shape[1]
         self._corners = corners[:, :2]
-        self._points = [corners[:1, :2]]
-        self._errors = [np.zeros(1)]
-        self._stride = 1
         self._seen = 1
-        self._kept = 1
-        self._window: tuple[np.ndarray, np.ndarray] | None = None
+        self._recent = corners[:1, :2]
+        # Every stride-th point.
+        self._points = [self._recent]
+        self._kept = self._stride = 1
+        # The largest of every span of errors.
+        self._errors = np.zeros(_COLUMNS)
+        self._span = 1
         self._worst = -1.0
+        self._window = np.empty((0, 2), dtype=np.int64)
+        self._center: np.ndarray | None = None
+        self._awaited = 0
 
     def follow(self, points: np.ndarray, errors: np.ndarray) -> None:
         """Take in points, shape (steps, axes), and their distances from the true path, in steps."""
         if not len(points):
             return
+        points = points[:, :2]
+        self._follow_worst(points, errors)
+        index = np.arange(self._seen, self._seen + len(points))
+        self._seen += len(points)
+
+        kept = points[index % self._stride == 0]
+        self._points.append(kept)
+        self._kept += len(kept)
+        while self._kept > _POINTS:
+            self._points = [np.concatenate(self._points)[::2]]
+            self._kept = len(self._points[0])
+            self._stride *= 2
+
+        while self._seen > _COLUMNS * self._span:
+            halves = self._errors.reshape(-1, 2).max(axis=1)
+            self._errors = np.concatenate([halves, np.zeros_like(halves)])
+            self._span *= 2
+        np.maximum.at(self._errors, index // self._span, errors)
+
+    def _follow_worst(self, points: np.ndarray, errors: np.ndarray) -> None:
+        """Keep the points around the largest error, also when they come in two parts."""
+        if self._awaited:
+            self._window = np.concatenate([self._window, points[: self._awaited]])
+            self._awaited = max(0, self._awaited - len(points))
+        behind = len(self._recent)
+        points = np.concatenate([self._recent, points])
         worst = int(np.argmax(errors))
         if errors[worst] > self._worst:
             self._worst = float(errors[worst])
-            near = slice(max(0, worst - 12), worst + 13)
-            self._window = points[near, :2].copy(), points[worst, :2].copy()
-        keep = np.arange(-self._seen % self._stride, len(points), self._stride)
-        self._seen += len(points)
-        self._points.append(points[keep, :2])
-        self._errors.append(errors[keep])
-        self._kept += len(keep)
-        if self._kept > _ROOM:
-            self._points = [np.concatenate(self._points)[::2]]
-            self._errors = [np.concatenate(self._errors)[::2]]
-            self._kept = len(self._errors[0])
-            self._stride *= 2
+            worst += behind
+            self._center = points[worst]
+            self._window = points[max(0, worst - _NEAR) : worst + _NEAR + 1]
+            self._awaited = max(0, worst + _NEAR + 1 - len(points))
+        self._recent = points[-_NEAR:]
 
     def save(self, path: Path, kind: str, title: str) -> None:
         """Write the picture; ``kind`` is ``.png`` or ``.svg``."""
+        # Not needed, and half the start, of a command that draws nothing.
+        from matplotlib import style
         from matplotlib.figure import Figure
 
-        points, errors = np.concatenate(self._points), np.concatenate(self._errors)
-        # The same path gives the same bytes: no date, and names that hang on nothing random.
-        with mpl.rc_context({"svg.hashsalt": "discreta", "svg.fonttype": "none", "font.size": 9}):
+        # The same path gives the same bytes: no one's own settings, no date, no random names.
+        own = {"svg.hashsalt": "discreta", "svg.fonttype": "none", "font.size": 9}
+        with style.context(["default", own]):
             figure = Figure(figsize=(9, 6.5), dpi=110, layout="constrained")
             whole, near, along = figure.subplot_mosaic(
                 [["path", "near"], ["error", "error"]],
                 height_ratios=[3, 1],
                 width_ratios=[1.7, 1],
             ).values()
-            self._draw_path(whole, points)
-            whole.set(title=title, xlabel="x, steps", ylabel="y, steps")
+            if self._axes > 2:
+                title += f"; x and y of {AXIS_LETTERS[: self._axes]}"
+            self._draw_path(whole, title)
             self._draw_window(near)
-            along.plot(np.arange(len(errors)) * self._stride, errors, color="#c0392b", lw=0.7)
-            along.set(
-                title="distance from the true path",
-                xlabel="steps taken",
-                ylabel="steps",
-                ylim=(0, None),
-            )
-            along.margins(x=0)
-            along.grid(alpha=0.3)
+            self._draw_errors(along)
+            figure.legend(handles=whole.get_lines(), loc="outside lower center", ncols=4)
             metadata = {"Date": None} if kind == ".svg" else {"Software": None}
             figure.savefig(path, format=kind[1:], metadata=metadata)
 
-    def _draw_path(self, axes, points: np.ndarray) -> None:
-        axes.plot(*self._corners.T, color="#2c7fb8", lw=1.6, label="true path")
-        axes.plot(*points.T, color="#222222", lw=0.7, label="steps taken")
+    def _draw_path(self, axes, title: str) -> None:
+        points = np.concatenate([*self._points, self._recent[-1:]])
+        axes.plot(*self._corners.T, color="#2c7fb8", lw=1.6, label="true path", gid="true")
+        axes.plot(*points.T, color="#222222", lw=0.7, label="steps taken", gid="steps")
         axes.plot(*self._corners[0], "o", color="#2ca02c", ms=8, label="start")
-        axes.plot(*self._corners[-1], "s", color="#c0392b", ms=4, label="end")
+        axes.plot(*points[-1], "s", color="#c0392b", ms=4, label="end")
         axes.set_aspect("equal", adjustable="datalim")
+        axes.set(title=title, xlabel="x, steps", ylabel="y, steps")
+        axes.locator_params(integer=True)
         axes.grid(alpha=0.3)
-        axes.legend(loc="best", frameon=True, fontsize=8)
 
     def _draw_window(self, axes) -> None:
-        if self._window is None:
+        if self._center is None:
             axes.set_axis_off()
             return
-        points, worst = self._window
+        x, y = self._center
         axes.plot(*self._corners.T, color="#2c7fb8", lw=1.6)
-        axes.plot(*points.T, "o-", color="#222222", lw=0.9, ms=3)
-        axes.plot(*worst, "o", color="#c0392b", ms=6)
-        axes.set_xlim(worst[0] - 7, worst[0] + 7)
-        axes.set_ylim(worst[1] - 7, worst[1] + 7)
+        axes.plot(*self._window.T, "o-", color="#222222", lw=0.9, ms=3, gid="near")
+        axes.plot(x, y, "o", color="#c0392b", ms=6)
         axes.set_aspect("equal", adjustable="box")
         axes.set(
-            title=f"largest error: {self._worst:.4f} step", xlabel="x, steps", ylabel="y, steps"
+            title=f"largest error: {self._worst:.4f} step",
+            xlabel="x, steps",
+            ylabel="y, steps",
+            xlim=(x - _SIDE, x + _SIDE),
+            ylim=(y - _SIDE, y + _SIDE),
         )
+        axes.locator_params(integer=True)
+        axes.grid(alpha=0.3)
+
+    def _draw_errors(self, axes) -> None:
+        errors = self._errors[: -(-self._seen // self._span)]
+        each = f", the largest of every {self._span} steps" if self._span > 1 else ""
+        axes.plot(np.arange(len(errors)) * self._span, errors, color="#c0392b", lw=0.7, gid="error")
+        axes.set(
+            title=f"distance from the true path{each}",
+            xlabel="steps taken",
+            ylabel="steps",
+            ylim=(0, None),
+        )
+        axes.locator_params(axis="x", integer=True)
+        axes.margins(x=0)
         axes.grid(alpha=0.3)

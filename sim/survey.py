@@ -21,8 +21,8 @@ SEED = 1970
 #: Clocks that the sample of a width may take for one variant; a width beyond has no survey.
 CLOCK_BUDGET = 1 << 25
 
-#: Lines that the golden model runs side by side, and the RTL between two comparisons.
-_BATCH, _SLICE = 2048, 128
+#: Lines that run side by side, and lines times clocks between two comparisons.
+_BATCH, _WINDOW = 2048, 1 << 16
 
 #: Clocks around the summations: acceptance, start, and the last step, which leaves a clock later.
 _OVERHEAD = 4
@@ -163,53 +163,74 @@ def _survey_part(name: str, width: int, variant: dict[str, Any], blocks: np.ndar
     method = METHODS[name]
     golden = method.golden(width, 2, **variant)
     clocks = int(method.summations(golden, _lengths(blocks)).max()) + _OVERHEAD
-    expected = _run_golden(golden, blocks, clocks)
     names = list(golden.registers())
     model = _model(name, width, tuple(variant.items()))
     row = SurveyRow(variant, lines=len(blocks), clocks=len(blocks) * clocks)
-    for begin in range(0, len(blocks), _SLICE):
-        lanes = slice(begin, begin + _SLICE)
-        seen = model.lanes(blocks[lanes], clocks)
-        wanted = np.ascontiguousarray(expected[:, lanes].T).reshape(seen.shape)
+    judge = _Judge(row, blocks)
+    window = max(1, _WINDOW // len(blocks))
+    windows = model.lanes(blocks, clocks, window=window)
+    clock = 0
+    for seen, wanted in zip(windows, _run_golden(golden, blocks, clocks, window), strict=True):
         if not row.mismatches and not np.array_equal(seen, wanted):
-            lane, clock, register = np.argwhere(seen != wanted)[0]
+            lane, late, register = np.argwhere(seen != wanted)[0]
             row.mismatches.append(
-                f"{names[register]} is {seen[lane, clock, register]} in clock {clock} of the line "
-                f"{blocks[begin + lane].tolist()}, where the golden model has "
-                f"{wanted[lane, clock, register]}"
+                f"{names[register]} is {seen[lane, late, register]} in clock {clock + late} of the "
+                f"line {blocks[lane].tolist()}, where the golden model has "
+                f"{wanted[lane, late, register]}"
             )
-        _judge(row, blocks[lanes], dict(zip(names, np.moveaxis(seen, 2, 0), strict=True)))
+        judge.follow(clock, dict(zip(names, np.moveaxis(seen, 2, 0), strict=True)))
+        clock += seen.shape[1]
+    judge.end()
     return row
 
 
-def _run_golden(golden: Any, blocks: np.ndarray, clocks: int) -> np.ndarray:
-    """Give every register at every clock, shape (clocks · registers, lines)."""
+def _run_golden(golden: Any, blocks: np.ndarray, clocks: int, window: int) -> Iterator[np.ndarray]:
+    """Give every register at every clock, shape (lines, clocks of a window, registers)."""
     state = {name: np.full(len(blocks), value) for name, value in golden.reset().items()}
     fields = ("blocks_start_x", "blocks_start_y", "blocks_end_x", "blocks_end_y")
     inputs: dict[str, Any] = dict(zip(fields, blocks.T, strict=True))
     inputs |= {"blocks_valid": 1, "steps_ready": 1}
-    record = np.empty((clocks * len(state), len(blocks)), dtype=np.int32)
-    for clock in range(clocks):
-        for index, name in enumerate(golden.registers()):
-            record[clock * len(state) + index] = state[name]
-        state = golden.step(state, inputs)
-        inputs["blocks_valid"] = 0
-    return record
+    names = list(golden.registers())
+    for begin in range(0, clocks, window):
+        count = min(window, clocks - begin)
+        record = np.empty((count, len(names), len(blocks)), dtype=np.int64)
+        for clock in range(count):
+            for index, name in enumerate(names):
+                record[clock, index] = state[name]
+            state = golden.step(state, inputs)
+            inputs["blocks_valid"] = 0
+        lines = np.ascontiguousarray(record.reshape(-1, len(blocks)).T)
+        yield lines.reshape(len(blocks), count, len(names))
 
 
-def _judge(row: SurveyRow, blocks: np.ndarray, seen: dict[str, np.ndarray]) -> None:
-    """Take the recorded registers, shape (lines, clocks) each, into the row."""
-    starts, lengths = blocks[:, :2], blocks[:, 2:] - blocks[:, :2]
-    points = np.stack([seen["p3"], seen["p4"]], axis=-1) - starts[:, None]
-    moves = np.any(lengths != 0, axis=1)
-    # A block is accepted in clock 0 and started in clock 1: the position holds from clock 2 on.
-    errors = distance_from_line(points[moves, 2:], lengths[moves, None])
-    if errors.size and errors.max() > row.largest_error:
-        row.largest_error = float(errors.max())
-        lane, clock = np.unravel_index(np.argmax(errors), errors.shape)
-        line = lengths[moves][lane]
-        row.error_at = (*line.tolist(), *points[moves][lane, clock + 2].tolist())
-    ended = np.all(points[:, -1] == lengths, axis=1) & (seen["done"].sum(axis=1) == 1)
-    row.ends_missed += int(np.count_nonzero(~ended))
-    row.summations += int(seen["running"].sum())
-    row.longest += int(np.abs(lengths).max(axis=1).sum())
+class _Judge:
+    """Takes the recorded registers, window by window, into a row."""
+
+    def __init__(self, row: SurveyRow, blocks: np.ndarray):
+        self._row = row
+        self._starts = blocks[:, :2]
+        self._lengths = blocks[:, 2:] - blocks[:, :2]
+        self._moves = np.any(self._lengths != 0, axis=1)
+        self._answers = np.zeros(len(blocks), dtype=np.int64)
+        self._ended = np.zeros(len(blocks), dtype=bool)
+        row.longest += int(np.abs(self._lengths).max(axis=1).sum())
+
+    def follow(self, clock: int, seen: dict[str, np.ndarray]) -> None:
+        """Take in a window that begins with ``clock``; registers have shape (lines, clocks)."""
+        row, moves = self._row, self._moves
+        points = np.stack([seen["p3"], seen["p4"]], axis=-1) - self._starts[:, None]
+        # Accepted in clock 0 and started in clock 1: the position holds from clock 2 on.
+        late = max(0, 2 - clock)
+        errors = distance_from_line(points[moves, late:], self._lengths[moves, None])
+        if errors.size and errors.max() > row.largest_error:
+            row.largest_error = float(errors.max())
+            lane, when = np.unravel_index(np.argmax(errors), errors.shape)
+            line, point = self._lengths[moves][lane], points[moves][lane, when + late]
+            row.error_at = (*line.tolist(), *point.tolist())
+        self._answers += seen["done"].sum(axis=1)
+        self._ended = np.all(points[:, -1] == self._lengths, axis=1)
+        row.summations += int(seen["running"].sum())
+
+    def end(self) -> None:
+        """Count the lines that were not done, once, on their end point."""
+        self._row.ends_missed += int(np.count_nonzero(~(self._ended & (self._answers == 1))))

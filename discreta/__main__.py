@@ -1,0 +1,5 @@
+"""``python -m discreta`` is ``discreta``."""
+
+from discreta.cli import main
+
+main()

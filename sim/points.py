@@ -1,0 +1,153 @@
+"""Points as users write them, checked against what a device has room for."""
+
+import csv
+import re
+from array import array
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from discreta.hdl.contract import AXIS_LETTERS, MAX_AXES, MAX_WIDTH, MIN_AXES
+
+__all__ = ["BadInputError", "check_line", "check_path", "parse_point", "read_points", "say_point"]
+
+_WHOLE_NUMBER = re.compile(r"\s*[+-]?[0-9]{1,1000}\s*")
+
+
+class BadInputError(ValueError):
+    """What was given cannot be run; the message names the value, the limit and the cure."""
+
+
+def say_point(point: Sequence[int] | np.ndarray) -> str:
+    """Write a point as users do: ``200,99``."""
+    return ",".join(str(value) for value in point)
+
+
+def _cut(text: str) -> str:
+    """Quote a text for a message, which it must not flood."""
+    return repr(text if len(text) <= 40 else f"{text[:40]}…")
+
+
+def parse_point(cells: Sequence[str]) -> tuple[int, ...] | None:
+    """Read whole numbers of steps, one a cell; None when a cell is something else."""
+    if not all(_WHOLE_NUMBER.fullmatch(cell) for cell in cells):
+        return None
+    return tuple(int(cell) for cell in cells)
+
+
+def check_line(start: Sequence[int], end: Sequence[int], width: int) -> None:
+    """Refuse a line that a device of ``width`` bits has no room for.
+
+    Raises
+    ------
+    BadInputError
+        A coordinate or a length is out of range.
+    """
+    modulus = 1 << width
+    for point in (start, end):
+        for value in point:
+            if not -modulus <= value < modulus:
+                raise BadInputError(
+                    f"coordinate {_cut(str(value))[1:-1]} is out of range: width {width} has room "
+                    f"for {-modulus} to {modulus - 1}; {_wider(value if value >= 0 else ~value)}"
+                )
+    length = max(abs(b - a) for a, b in zip(start, end, strict=True))
+    if length >= modulus:
+        raise BadInputError(
+            f"the line from {say_point(start)} to {say_point(end)} is {length} steps long: "
+            f"width {width} has room for {modulus - 1}; {_wider(length)}"
+        )
+
+
+def check_path(points: np.ndarray, width: int) -> None:
+    """Refuse a path, shape (points, axes), that has a line for which there is no room.
+
+    Raises
+    ------
+    BadInputError
+        A coordinate or a length is out of range.
+    """
+    modulus = 1 << width
+    wrong = np.any((points < -modulus) | (points >= modulus), axis=1)
+    wrong[1:] |= np.any(np.abs(np.diff(points, axis=0)) >= modulus, axis=1)
+    for index in np.flatnonzero(wrong)[:1]:
+        check_line(points[max(0, index - 1)].tolist(), points[index].tolist(), width)
+
+
+def _wider(value: int) -> str:
+    """Give the cure for a value that needs more bits."""
+    width = value.bit_length()
+    if width <= MAX_WIDTH:
+        return f"give --width {width}"
+    return f"no device has more than {MAX_WIDTH} bits"
+
+
+def read_points(file: str, width: int) -> np.ndarray:
+    """Read the support points of a path for a device of ``width`` bits.
+
+    The file has a header with the axis letters and a point in every row; blank rows are left out.
+
+    Returns
+    -------
+    array of int64, shape (points, axes)
+
+    Raises
+    ------
+    BadInputError
+        The file cannot be read, is not such a file, has fewer than two points, or has one out of
+        range.
+    """
+    axes = 0
+    last: tuple[int, ...] | None = None
+    points = array("q")
+    try:
+        with Path(file).open(encoding="utf-8-sig", newline="") as lines:
+            rows = csv.reader(lines)
+            for row in rows:
+                if not any(cell.strip() for cell in row):
+                    continue
+                if not axes:
+                    axes = _axes(file, row)
+                    continue
+                where = f"{file}, line {rows.line_num}"
+                point = parse_point(row)
+                if point is None or len(point) != axes:
+                    raise BadInputError(
+                        f"{where}: {_cut(','.join(row))} is not a point: give {axes} whole numbers "
+                        "of steps"
+                    )
+                try:
+                    check_line(point if last is None else last, point, width)
+                except BadInputError as error:
+                    raise BadInputError(f"{where}: {error}") from None
+                points.extend(point)
+                last = point
+    except OSError as error:
+        raise BadInputError(f"cannot read {file}: {error.strerror}; name a CSV file") from None
+    except (UnicodeDecodeError, csv.Error):
+        raise BadInputError(
+            f"{file} is not a CSV file in UTF-8: give a line x,y and a support point in every line "
+            "after it"
+        ) from None
+    if not axes:
+        raise BadInputError(
+            f"{file} is empty: give a line x,y and a support point in every line after it"
+        )
+    if len(points) < 2 * axes:
+        raise BadInputError(
+            f"{file} has too few support points, {len(points) // axes}: a path needs at least 2"
+        )
+    return np.array(points, dtype=np.int64).reshape(-1, axes)
+
+
+def _axes(file: str, header: list[str]) -> int:
+    """Give the number of axes that a header names."""
+    axes = len(header)
+    names = [name.strip().lower() for name in header]
+    if not MIN_AXES <= axes <= MAX_AXES or names != list(AXIS_LETTERS[:axes]):
+        raise BadInputError(
+            f"{file} begins with {_cut(','.join(header))}: the first line must name the axes, "
+            f"{','.join(AXIS_LETTERS[:MIN_AXES])} or up to {','.join(AXIS_LETTERS)}"
+        )
+    return axes
