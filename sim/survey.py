@@ -67,8 +67,9 @@ class SurveyRow:
 
     def add(self, other: "SurveyRow") -> None:
         """Take in another part of the same survey."""
-        if other.largest_error > self.largest_error:
-            self.largest_error, self.error_at = other.largest_error, other.error_at
+        # Parts come in any order: of equal errors the same one must win.
+        worst = max((row.largest_error, row.error_at) for row in (self, other))
+        self.largest_error, self.error_at = worst
         for name in ("lines", "clocks", "ends_missed", "summations", "longest"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
         self.mismatches += other.mismatches
