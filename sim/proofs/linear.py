@@ -240,7 +240,7 @@ class _Registers:
                 "stall: a step that is not taken stays, and no register of the block moves",
                 [inv, self.waiting, z3.Not(self.taken)],
                 same({name: self.after[name] for name in self.moving()}, self.state)
-                + same(
+                | same(
                     {f"steps_{a}": outputs[f"steps_{a}"] for a in letters},
                     self.golden.outputs(self.after),
                 ),

@@ -117,7 +117,7 @@ def test_the_path_is_the_same_however_long_a_step_waits(stall):
         for stalls in (NO_STALLS, Stalls(7, stall=stall))
     )
     moves = [run.events[run.events[:, TAKEN] == 1, TAKEN + 1 :] for run in (free, held)]
-    assert np.array_equal(*moves)
+    assert np.array_equal(moves[0], moves[1])
     assert (held.ran > free.ran) == (stall > 0)
 
 
