@@ -14,8 +14,9 @@ __all__ = ["write_view"]
 #: Where pysim puts the interpolator.
 _CORE = ["bench", "top", "core"]
 
-#: Height of a curve, in rows of GTKWave.
-_CURVE_ROWS = 4
+#: Height of a curve, in rows of GTKWave, and size of its window, in pixels.
+_CURVE_ROWS = 3
+_WINDOW = (1400, 900)
 
 
 def write_view(view: IO[str], vcd: Path, shown_as: str, core: Part) -> None:
@@ -37,17 +38,9 @@ def write_view(view: IO[str], vcd: Path, shown_as: str, core: Part) -> None:
     save = GTKWSave(view)
     save.dumpfile(shown_as, abspath=False)
     save.treeopen(".".join(_CORE) + ".")
-    save.signals_width(220)
-    save.trace("bench.top.clk")
-    with save.group("blocks and steps"):
-        for port in ports:
-            if port.split("_")[0] in ("blocks", "steps", "busy", "done", "error"):
-                save.trace(ports[port], datafmt="signed")
-    for title, registers in core.diagram.items():
-        with save.group(title):
-            for register in registers:
-                datafmt = "signed" if register.shape().signed else "dec"
-                save.trace(names[register.name], alias=register.name, datafmt=datafmt)
+    save.sst_expanded(False)
+    save.signals_width(200)
+    save.size(*_WINDOW)
     with save.group("coordinates"):
         for port in ports:
             if port.startswith("position_"):
@@ -55,10 +48,20 @@ def write_view(view: IO[str], vcd: Path, shown_as: str, core: Part) -> None:
                     ports[port],
                     alias=port,
                     datafmt="signed",
-                    extraflags=GTKWFlag.analog_step | GTKWFlag.analog_fullscale,
+                    extraflags=GTKWFlag.analog_step,
                 )
                 for _ in range(_CURVE_ROWS):
                     save.blank(analog_extend=True)
+    for title, registers in core.diagram.items():
+        with save.group(title):
+            for register in registers:
+                datafmt = "signed" if register.shape().signed else "dec"
+                save.trace(names[register.name], alias=register.name, datafmt=datafmt)
+    with save.group("blocks and steps"):
+        save.trace(ports["clk"], alias="clk")
+        for port in ports:
+            if port.split("_")[0] in ("blocks", "steps", "busy", "done", "error"):
+                save.trace(ports[port], alias=port, datafmt="signed")
 
 
 def _variables(vcd: Path) -> Iterator[tuple[list[str], str, str]]:
