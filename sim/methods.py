@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import product
 from typing import Any
 
@@ -47,9 +48,7 @@ class Method:
     def promises(self, golden: Any) -> list:
         """Give what is proven of the method beyond its equality to the golden model."""
         # Only the prover needs the solver.
-        from discreta.sim.proofs.linear import promises
-
-        return {"linear": promises}[self.name](golden)
+        return import_module(f"discreta.sim.proofs.{self.name}").promises(golden)
 
     def variants(self) -> list[dict[str, Any]]:
         """Give every combination of the choices."""
