@@ -1,17 +1,16 @@
 """The command line: ``discreta``."""
 
-import csv
-import json
 import os
+import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from importlib import metadata
-from itertools import pairwise
-from pathlib import Path
-from typing import IO, Any
+from io import TextIOWrapper
+from typing import Any, NoReturn, cast
 
 import click
 import numpy as np
@@ -19,22 +18,24 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from discreta.hdl.contract import AXIS_LETTERS, MAX_AXES, MIN_AXES, check_axes, check_width
+from discreta.hdl.contract import (
+    MAX_AXES,
+    MAX_WIDTH,
+    MIN_AXES,
+    MIN_WIDTH,
+    check_axes,
+    check_width,
+)
 from discreta.hdl.parts import PRELOADS
 from discreta.hdl.verilog import verilog as emit_verilog
-from discreta.sim.contour import LineContour
+from discreta.sim.compiled import compiler
 from discreta.sim.methods import METHODS, Method
 from discreta.sim.outputs import Outputs
-from discreta.sim.plot import FORMATS, PathPlot
-from discreta.sim.simulate import ENGINES, DeadCoreError, default_engine, simulate
-from discreta.sim.view import write_view
+from discreta.sim.points import BadInputError, check_line, parse_point, read_points, say_point
+from discreta.sim.run import run_path, say_choices
+from discreta.sim.simulate import ENGINES, DeadCoreError, default_engine
 
 __all__ = ["main"]
-
-#: Clocks a block may take beside its summations: acceptance, start, and the last step.
-_OVERHEAD = 4
-
-_stderr = Console(stderr=True, highlight=False)
 
 
 class _Point(click.ParamType):
@@ -43,13 +44,8 @@ class _Point(click.ParamType):
     name = "X,Y"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, ...]:
-        if isinstance(value, tuple):
-            return value
-        try:
-            point = tuple(int(item) for item in value.split(","))
-        except ValueError:
-            point = ()
-        if not MIN_AXES <= len(point) <= MAX_AXES:
+        point = parse_point(value.split(","))
+        if point is None or not MIN_AXES <= len(point) <= MAX_AXES:
             self.fail(
                 f"{value!r} is not a point: give {MIN_AXES} to {MAX_AXES} whole numbers of steps "
                 "with commas between, like 200,99",
@@ -72,18 +68,24 @@ class _MethodName(click.ParamType):
         return METHODS[value]
 
 
-def _checked(check: Callable[[int], None]) -> Callable[..., int]:
-    """Make a click callback of one of the hardware's own checks."""
+class _Number(click.ParamType):
+    """A whole number that the hardware's own check accepts."""
 
-    def callback(ctx: click.Context, param: click.Parameter, value: Any) -> Any:
+    name = "N"
+
+    def __init__(self, what: str, low: int, high: int, check: Callable[[int], None]):
+        self._what, self._low, self._high, self._check = what, low, high, check
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> int:
+        number = parse_point([str(value)])
+        if number is None:
+            limits = f"a whole number from {self._low} to {self._high}"
+            self.fail(f"{self._what} is {value!r}: choose {limits}", param, ctx)
         try:
-            for item in value if isinstance(value, tuple) else (value,):
-                check(item)
+            self._check(*number)
         except ValueError as error:
-            raise click.BadParameter(str(error), ctx, param) from None
-        return value
-
-    return callback
+            self.fail(str(error), param, ctx)
+        return number[0]
 
 
 def _options(*options: Callable) -> Callable:
@@ -97,24 +99,32 @@ def _options(*options: Callable) -> Callable:
 
 _width = click.option(
     "--width",
-    type=int,
+    type=_Number("width", MIN_WIDTH, MAX_WIDTH, check_width),
     default=16,
     show_default=True,
-    callback=_checked(check_width),
-    help="Bits of the increments, 4 to 32; coordinates have one more and a sign.",
+    help="Bits of the device, 4 to 32: lines are up to 2^N - 1 steps long, coordinates lie between "
+    "-2^N and 2^N - 1.",
+)
+
+_axes = click.option(
+    "--axes",
+    type=_Number("number of axes", MIN_AXES, MAX_AXES, check_axes),
+    default=2,
+    show_default=True,
+    help="2 to 6.",
 )
 _preload = click.option(
     "--preload",
     type=click.Choice(PRELOADS),
     default="half",
     show_default=True,
-    help="What the summators start from.",
+    help="What the summators start from: 0, or half of what they hold.",
 )
 _normalize = click.option(
     "--normalize/--no-normalize",
     default=True,
     show_default=True,
-    help="Shift the increments left together first: faster, same path bound.",
+    help="Shift the increments left together first: fewer clocks, the same bound of the error.",
 )
 _run_options = _options(
     click.option(
@@ -135,290 +145,132 @@ _run_options = _options(
     click.option("--trace", metavar="FILE.csv|-", help="Every step: clock, then the coordinates."),
     click.option("--vcd", metavar="FILE.vcd", help="Waveform, with a .gtkw view beside it."),
     click.option("--plot", metavar="FILE.svg|.png", help="Picture of the path and its error."),
-    click.option("--json", "json_file", metavar="FILE|-", help="The summary, as JSON."),
+    click.option("--json", "summary_file", metavar="FILE|-", help="The summary, as JSON."),
 )
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+class _Commands(click.Group):
+    """Commands whose standard output may end before they do."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; when nobody reads what it prints, end as other commands do."""
+        try:
+            try:
+                return super().invoke(ctx)
+            finally:
+                sys.stdout.flush()
+        except BrokenPipeError:
+            # What is still in the buffer must not fail again at the end of Python.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise click.exceptions.Exit(128 + signal.SIGPIPE) from None
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(metadata.version("discreta"), prog_name="discreta")
 def cli() -> None:
-    """Interpolators as hardware: from a start to an end along a curve, every smallest step."""
+    """Interpolators as hardware: from a start to an end along a curve, every smallest step.
+
+    Example: discreta simulate line --start 0,0 --end 200,99 --plot line.svg
+    """
 
 
 @cli.group("simulate")
 def simulate_group() -> None:
-    """Run the RTL clock by clock."""
+    """Run the RTL clock by clock.
+
+    Example: discreta simulate line --start 0,0 --end 200,99 --plot line.svg
+    """
 
 
 @simulate_group.command("line")
 @click.option("--start", type=_Point(), required=True, help="Where the line begins, in steps.")
 @click.option("--end", type=_Point(), required=True, help="Where it ends.")
 @_run_options
-def simulate_line(start: tuple[int, ...], end: tuple[int, ...], **options: Any) -> None:
+def simulate_line(start: tuple[int, ...], end: tuple[int, ...], width: int, **options: Any) -> None:
     """Run one line in two to six axes.
+
+    Exits 1 when the end is not reached.
 
     Example: discreta simulate line --start 0,0 --end 200,99 --plot line.svg
     """
     if len(start) != len(end):
-        raise click.UsageError(
+        raise BadInputError(
             f"--start has {len(start)} coordinates and --end has {len(end)}: give both as many"
         )
-    _simulate(np.array([start, end], dtype=object), path=False, **options)
+    check_line(start, end, width)
+    _simulate(np.array([start, end], dtype=np.int64), width=width, **options)
 
 
 @simulate_group.command("path")
 @click.argument("file", metavar="FILE.csv")
 @_run_options
-def simulate_path(file: str, **options: Any) -> None:
+def simulate_path(file: str, width: int, **options: Any) -> None:
     """Run a polyline of support points without a gap.
 
     FILE.csv has a header with the axis letters (x,y and so on) and a support point in every row, in
-    steps. A path whose last point is its first is closed.
+    steps. A path whose last point is its first is closed. A point that repeats the one before it
+    takes a clock or two and no step. Exits 1 when a point is missed.
 
     Example: discreta simulate path examples/bulgaria.csv --plot border.svg
     """
-    _simulate(_read_points(file), path=True, **options)
+    _simulate(read_points(file, width), width=width, reads=(file,), **options)
 
 
-def _read_points(file: str) -> np.ndarray:
-    """Read the support points of a path, shape (points, axes)."""
-    try:
-        with Path(file).open(encoding="utf-8-sig", newline="") as lines:
-            rows = list(csv.reader(lines))
-    except OSError as error:
-        raise click.UsageError(f"cannot read {file}: {error.strerror}") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise click.UsageError(f"{file} is not a CSV file: {error}") from None
-    header = [name.strip().lower() for name in rows[0]] if rows else []
-    axes = len(header)
-    if not MIN_AXES <= axes <= MAX_AXES or header != list(AXIS_LETTERS[:axes]):
-        said = ",".join(header)
-        raise click.UsageError(
-            f"{file} begins with {said!r}: the first line must name the axes, like x,y"
-            if rows
-            else f"{file} is empty: give a line x,y and a support point in every line after it"
-        )
-    points = []
-    for number, row in enumerate(rows[1:], start=2):
-        if not row:
-            continue
-        try:
-            point = [int(item) for item in row]
-        except ValueError:
-            point = []
-        if len(point) != axes:
-            raise click.UsageError(
-                f"{file}, line {number}: {','.join(row)!r} is not a point: "
-                f"give {axes} whole numbers of steps"
-            )
-        points.append(point)
-    if len(points) < 2:
-        raise click.UsageError(
-            f"{file} has too few support points, {len(points)}: a path needs at least 2"
-        )
-    return np.array(points, dtype=object)
+def _simulate(points: np.ndarray, **options: Any) -> None:
+    trace, vcd = options["trace"], options["vcd"]
+    # Without a word the run would only seem slow.
+    slow = options["engine"] is None and vcd is None and default_engine() == "pysim"
+    # The steps may go to the very terminal of the bar.
+    with _progress("clocks", quiet=trace == "-") as show:
 
+        def progress(done: int, total: int) -> None:
+            if slow and not done:
+                click.echo("no C++ compiler found: on pysim, a thousand times slower", err=True)
+            show(done, total)
 
-def _check_range(points: np.ndarray, width: int) -> np.ndarray:
-    """Refuse coordinates and lengths that the device has no bits for."""
-    modulus = 1 << width
-    for point in points:
-        for value in point:
-            if not -modulus <= value < modulus:
-                raise click.UsageError(
-                    f"coordinate {value} of {_name(point)} is out of range: width {width} has room "
-                    f"for {-modulus} to {modulus - 1}; give a larger --width (up to 32)"
-                )
-    for start, end in pairwise(points):
-        length = max(abs(end - start))
-        if length >= modulus:
-            raise click.UsageError(
-                f"the line from {_name(start)} to {_name(end)} is {length} steps long: width "
-                f"{width} has room for {modulus - 1}; give a larger --width (up to 32)"
-            )
-    return points.astype(np.int64)
-
-
-def _name(point: Any) -> str:
-    return ",".join(str(value) for value in point)
-
-
-def _simulate(
-    points: np.ndarray,
-    *,
-    path: bool,
-    method: Method,
-    width: int,
-    preload: str,
-    normalize: bool,
-    engine: str | None,
-    trace: str | None,
-    vcd: str | None,
-    plot: str | None,
-    json_file: str | None,
-) -> None:
-    points = _check_range(points, width)
-    if vcd == "-":
-        raise click.UsageError("--vcd needs a file: its .gtkw view goes beside it")
-    if vcd and engine == "compiled":
-        raise click.UsageError("--vcd is written by pysim: leave out --engine compiled")
-    if trace == json_file == "-":
-        raise click.UsageError("--trace - and --json - would mix: send one of them to a file")
-    kind = Path(plot).suffix.lower() if plot else ""
-    if plot and kind not in FORMATS:
-        raise click.UsageError(f"--plot {plot}: choose a name that ends in {' or '.join(FORMATS)}")
-    if engine is None:
-        engine = "pysim" if vcd else default_engine()
-        if not vcd and engine == "pysim":
-            _stderr.print("no C++ compiler found: running on pysim, a thousand times slower")
-    elif engine == "compiled" and default_engine() != "compiled":
-        raise click.UsageError("--engine compiled needs a C++ compiler: install one or use pysim")
-
-    choices = {"normalize": normalize, "preload": preload}
-    axes = points.shape[1]
-    starts, ends = points[:-1], points[1:]
-    golden = method.golden(width, axes, **choices)
-    core = method.device(width, axes, **choices)
-    bound = method.summations(golden, np.abs(ends - starts))
-    contour = LineContour(starts, ends)
-    picture = PathPlot(points) if plot else None
-    runs = _Runs()
-    with Outputs() as outputs:
-        trace_file = outputs.open(trace) if trace else None
-        json_out = outputs.open(json_file) if json_file else None
-        plot_part = outputs.place(plot) if plot else None
-        vcd_part = outputs.place(vcd) if vcd else None
-        view = outputs.open(str(Path(vcd).with_suffix(".gtkw"))) if vcd else None
-        vcd_file = outputs.write(vcd_part) if vcd_part else None
-        rows = csv.writer(trace_file, lineterminator="\n") if trace_file else None
-        if rows:
-            rows.writerow(["clock", *AXIS_LETTERS[:axes]])
-            rows.writerow([0, *points[0].tolist()])
         began = time.perf_counter()
-        with _progress("blocks", len(starts)) as advance:
-            for stretch in simulate(
-                core,
-                np.concatenate([starts, ends], axis=1),
-                limit=int(bound.sum()) + _OVERHEAD * (len(starts) + 1),
-                engine=engine,
-                watch=("reg_running",),
-                vcd=vcd_file,
-                progress=advance,
-            ):
-                clocks, reached, errors = contour.follow(stretch)
-                runs.follow(stretch)
-                if rows:
-                    rows.writerows(np.column_stack([clocks, reached]).tolist())
-                if picture:
-                    picture.follow(reached, errors)
+        summary = run_path(points, progress=progress, **options)
         seconds = time.perf_counter() - began
-        summary = _summarize(method, core, engine, points, contour, runs, path)
-        if view and vcd_file and vcd_part and vcd:
-            vcd_file.close()
-            write_view(view, vcd_part, Path(vcd).name, core)
-        if picture and plot_part:
-            title = f"{method.name}, {width} bits, preload {preload}"
-            picture.save(plot_part, kind, title)
-        if json_out:
-            json.dump(summary, json_out, indent=2, ensure_ascii=False)
-            json_out.write("\n")
-    to_stdout = "-" not in (trace, json_file)
-    _print_summary(summary, seconds, sys.stdout if to_stdout else sys.stderr)
+    _print_summary(summary, seconds, err="-" in (trace, options["summary_file"]))
     if not summary["end point reached"]:
         raise click.exceptions.Exit(1)
 
 
-class _Runs:
-    """Counts the summations, and the clocks lost between blocks."""
-
-    def __init__(self):
-        self.summations = 0
-        self.lost = 0
-        self._was_running = False
-        self._ended: int | None = None
-        self._clock = 0
-
-    def follow(self, stretch: Any) -> None:
-        """Take in a stretch with ``reg_running`` watched; every step is taken at once."""
-        running = stretch.watch[:, 0] == 1
-        self.summations += int(np.count_nonzero(running))
-        before = np.r_[self._was_running, running[:-1]]
-        begins = np.flatnonzero(running & ~before) + self._clock
-        # The last step of a block waits, and is taken, in the first clock without a summation.
-        ends = np.flatnonzero(before & ~running) + self._clock
-        if self._ended is not None:
-            ends = np.r_[self._ended, ends]
-        for begin in begins:
-            earlier = ends[ends < begin]
-            if len(earlier):
-                self.lost += int(begin - earlier[-1] - 1)
-        if len(ends):
-            self._ended = int(ends[-1])
-        if len(running):
-            self._was_running = bool(running[-1])
-        self._clock += len(running)
-
-
-def _summarize(
-    method: Method,
-    core: Any,
-    engine: str,
-    points: np.ndarray,
-    contour: LineContour,
-    runs: _Runs,
-    path: bool,
-) -> dict[str, Any]:
-    segments = len(points) - 1
-    summary: dict[str, Any] = {
-        "method": method.name,
-        **core.parameters,
-        "engine": engine,
-        "clocks": contour.clocks,
-        "summations": runs.summations,
-        "steps": contour.steps,
-        "clocks per step": round(contour.clocks / contour.steps, 4) if contour.steps else None,
-        "largest error": round(contour.largest_error, 4),
-        "largest error at": list(contour.error_at),
-        "error bound": method.error_bound,
-    }
-    if path:
-        summary |= {
-            "segments": segments,
-            "support points hit": contour.ends_reached,
-            "path closed": bool(np.array_equal(points[0], points[-1])),
-            "clocks lost between blocks": runs.lost,
-        }
-    return summary | {"end point reached": contour.ends_reached == segments}
-
-
-def _print_summary(summary: dict[str, Any], seconds: float, file: IO[str]) -> None:
-    table = Table(show_header=False, box=None, pad_edge=False)
+def _print_summary(summary: dict[str, Any], seconds: float, *, err: bool) -> None:
+    room = max(map(len, summary))
     for name, value in summary.items():
-        if isinstance(value, bool):
+        if value is None:
+            value = "-"
+        elif isinstance(value, bool):
             value = "yes" if value else "no"
+        elif isinstance(value, float):
+            value = f"{value:.4f}"
         elif isinstance(value, list):
-            value = _name(value)
-        table.add_row(name, str(value))
-    table.add_row("time", f"{seconds:.2f} s")
-    Console(file=file, highlight=False).print(table)
+            value = say_point(value)
+        click.echo(f"{name:{room}}  {value}", err=err)
+    click.echo(f"{'time':{room}}  {seconds:.2f} s", err=err)
 
 
 @contextmanager
-def _progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Show a progress bar on a terminal; give the function that moves it on."""
+def _progress(what: str, *, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
+    """Show a progress bar on a terminal; give the function that takes what is done of the total."""
     columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    bar = Progress(*columns, console=_stderr, transient=True, disable=not sys.stderr.isatty())
-    with bar:
-        task = bar.add_task(what, total=total)
-        yield lambda count: bar.advance(task, count)
+    console = Console(stderr=True)
+    off = quiet or not sys.stderr.isatty()
+    with Progress(*columns, console=console, transient=True, disable=off) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _out() -> Console:
+    """Give the standard output: tables fold on a terminal and are whole in a file."""
+    return Console(highlight=False, width=None if sys.stdout.isatty() else 250)
 
 
 @cli.command()
 @click.argument("method", type=_MethodName())
 @_width
-@click.option(
-    "--axes", type=int, default=2, show_default=True, callback=_checked(check_axes), help="2 to 6."
-)
+@_axes
 @_preload
 @_normalize
 @click.option("--output", metavar="FILE.v", default="-", help="[default: standard output]")
@@ -429,12 +281,13 @@ def verilog(
 
     Example: discreta verilog linear --width 16 --output linear.v
     """
-    core = method.device(width, axes, normalize=normalize, preload=preload)
     with Outputs() as outputs:
-        outputs.open(output).write(emit_verilog(core, f"discreta_{method.name}"))
+        file = outputs.open(output)
+        core = method.device(width, axes, normalize=normalize, preload=preload)
+        file.write(emit_verilog(core, f"discreta_{method.name}"))
 
 
-@cli.command()
+@cli.command(short_help="Prove that the RTL equals its model and keeps its promises.")
 @click.argument("methods", type=_MethodName(), nargs=-1, required=True, metavar="METHOD...")
 @_width
 def prove(methods: tuple[Method, ...], width: int) -> None:
@@ -448,7 +301,7 @@ def prove(methods: tuple[Method, ...], width: int) -> None:
     try:
         from discreta.sim.prover import prove_variant
     except ModuleNotFoundError as error:
-        raise click.UsageError(
+        raise BadInputError(
             f"proofs need {error.name}: install the extra, pip install 'discreta[prove]'"
         ) from None
     out = Console(highlight=False, soft_wrap=True)
@@ -463,10 +316,13 @@ def prove(methods: tuple[Method, ...], width: int) -> None:
             [width] * len(jobs),
             [variant for _, variant in jobs],
         )
-        with _progress("variants", len(jobs)) as advance:
-            for (method, variant), verdicts in zip(jobs, results, strict=True):
-                advance(1)
-                out.print(f"{method.name}, width {width}, {_variant_name(variant)}")
+        with _progress("variants") as show:
+            show(0, len(jobs))
+            for done, ((method, variant), verdicts) in enumerate(
+                zip(jobs, results, strict=True), start=1
+            ):
+                show(done, len(jobs))
+                out.print(f"{method.name}, width {width}, {say_choices(variant)}")
                 for verdict in verdicts:
                     mark = "proven" if verdict.holds else "FAILED"
                     out.print(f"  {mark} {verdict.seconds:6.2f} s  {verdict.title}", markup=False)
@@ -480,17 +336,7 @@ def prove(methods: tuple[Method, ...], width: int) -> None:
         raise click.exceptions.Exit(1)
 
 
-def _variant_name(variant: dict[str, Any]) -> str:
-    words = []
-    for name, value in variant.items():
-        if isinstance(value, bool):
-            words.append(name if value else f"no {name}")
-        else:
-            words.append(f"{name} {value}")
-    return ", ".join(words)
-
-
-@cli.command("survey")
+@cli.command("survey", short_help="Run every line of a width and compare every register.")
 @click.argument("method", type=_MethodName())
 @_width
 def survey_command(method: Method, width: int) -> None:
@@ -504,21 +350,21 @@ def survey_command(method: Method, width: int) -> None:
     from discreta.sim.survey import SEED, SurveyRow, survey, survey_lines
 
     if default_engine() != "compiled":
-        raise click.UsageError("a survey needs the compiled engine: install a C++ compiler")
+        raise BadInputError("a survey needs the compiled engine: install a C++ compiler")
     try:
         blocks, exhaustive = survey_lines(width)
     except ValueError as error:
-        raise click.UsageError(str(error)) from None
+        raise BadInputError(str(error)) from None
     variants = method.variants()
     rows = [SurveyRow(variant) for variant in variants]
     began = time.perf_counter()
-    with _progress("lines", len(blocks) * len(variants)) as advance:
+    with _progress("lines") as show:
         for part in survey(method, width):
             rows[variants.index(part.variant)].add(part)
-            advance(part.lines)
+            show(sum(row.lines for row in rows), len(blocks) * len(variants))
     seconds = time.perf_counter() - began
 
-    out = Console(highlight=False)
+    out = _out()
     kind = "all" if exhaustive else f"a sample (seed {SEED}) of"
     out.print(f"{method.name}, width {width}: {kind} {len(blocks)} lines, every register compared")
     table = Table(box=None, pad_edge=False)
@@ -526,10 +372,10 @@ def survey_command(method: Method, width: int) -> None:
         table.add_column(heading, justify="left" if heading == "variant" else "right")
     for row in rows:
         table.add_row(
-            _variant_name(row.variant),
+            say_choices(row.variant),
             f"{row.largest_error:.4f}",
-            _name(row.error_at[:2]),
-            _name(row.error_at[2:]),
+            say_point(row.error_at[:2]),
+            say_point(row.error_at[2:]),
             f"{row.summations / row.longest:.4f}",
             str(row.ends_missed),
         )
@@ -540,7 +386,7 @@ def survey_command(method: Method, width: int) -> None:
     )
     for row in rows:
         for mismatch in row.mismatches:
-            _stderr.print(f"{_variant_name(row.variant)}: {mismatch}", markup=False)
+            click.echo(f"{say_choices(row.variant)}: {mismatch}", err=True)
     if not all(row.good for row in rows):
         raise click.exceptions.Exit(1)
 
@@ -556,34 +402,64 @@ def methods_command() -> None:
         table.add_column(heading)
     for method in METHODS.values():
         table.add_row(method.name, method.summary, method.error_bound, method.clocks_per_step)
-    Console(highlight=False).print(table)
+    _out().print(table)
 
 
 def main() -> None:
     """Run the command line: exit 0 on success, 1 when a check fails, 2 on bad input."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:  # else the caller has them ignored
+            signal.signal(number, _end)
+    # A pool ends its own processes by SIGTERM: there it must stay what it is.
+    os.register_at_fork(after_in_child=lambda: signal.signal(signal.SIGTERM, signal.SIG_DFL))
+    for stream in (sys.stdout, sys.stderr):
+        # An old terminal has no letters such as √ and УУ: any sign will do there.
+        cast(TextIOWrapper, stream).reconfigure(errors="replace")
     sys.exit(_run())
 
 
-def _run() -> int:
+def _end(number: int, _: Any) -> NoReturn:
+    """End by a signal as by an exception, so that no half file is left."""
+    raise SystemExit(128 + number)
+
+
+def _run(arguments: list[str] | None = None) -> int:
+    """Run one command; every failure that is no bug is one line on the standard error."""
     try:
-        return cli.main(prog_name="discreta", standalone_mode=False) or 0
+        return cli.main(arguments, prog_name="discreta", standalone_mode=False) or 0
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message(), err=True)
         return 2
-    except click.ClickException as error:
-        line = " ".join(error.format_message().split())
-        click.echo(f"discreta: {line}", err=True)
+    except click.UsageError as error:
+        _complain(error.format_message().rstrip(".") + _hint(error))
+        return 2
+    except BadInputError as error:
+        _complain(str(error))
         return 2
     except (click.Abort, KeyboardInterrupt):
-        click.echo("discreta: interrupted, nothing written", err=True)
-        return 130
+        _complain("interrupted, no file is written")
+        return 128 + signal.SIGINT
+    except subprocess.CalledProcessError as error:
+        if error.cmd[0] != compiler():
+            raise
+        _complain(f"{error.cmd[0]} does not work as a C++ compiler: set CXX to one that does")
+        return 2
     except OSError as error:
-        if isinstance(error, BrokenPipeError):
-            # Whoever read the output has seen enough.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return 0
-        click.echo(f"discreta: cannot write {error.filename}: {error.strerror}", err=True)
+        name = "" if error.filename is None else f" {error.filename or repr('')}"
+        _complain(f"cannot write{name}: {error.strerror}")
         return 2
     except DeadCoreError as error:
-        click.echo(f"discreta: {error}", err=True)
+        _complain(str(error))
         return 1
+
+
+def _complain(message: str) -> None:
+    click.echo(f"discreta: {' '.join(message.split())}", err=True)
+
+
+def _hint(error: click.UsageError) -> str:
+    """Say where to look, unless the message itself names what to give."""
+    named = isinstance(error, click.BadParameter) and not isinstance(error, click.MissingParameter)
+    if named or error.ctx is None:
+        return ""
+    return f": see {error.ctx.command_path} --help"

@@ -126,7 +126,9 @@ class PathPlot:
             figure.savefig(path, format=kind[1:], metadata=metadata)
 
     def _draw_path(self, axes, title: str) -> None:
-        points = np.concatenate([*self._points, self._recent[-1:]])
+        points = np.concatenate(self._points)
+        if self._stride > 1:
+            points = np.concatenate([points, self._recent[-1:]])
         axes.plot(*self._corners.T, color="#2c7fb8", lw=1.6, label="true path", gid="true")
         axes.plot(*points.T, color="#222222", lw=0.7, label="steps taken", gid="steps")
         axes.plot(*self._corners[0], "o", color="#2ca02c", ms=8, label="start")
@@ -152,7 +154,7 @@ class PathPlot:
             xlim=(x - _SIDE, x + _SIDE),
             ylim=(y - _SIDE, y + _SIDE),
         )
-        axes.locator_params(integer=True)
+        axes.locator_params(integer=True, nbins=5)
         axes.grid(alpha=0.3)
 
     def _draw_errors(self, axes) -> None:

@@ -3,7 +3,6 @@
 import csv
 import json
 from collections.abc import Callable, Iterable
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +71,7 @@ def run_path(
         The device does not answer.
     """
     check_path(points, width)
-    if vcd == "-":
+    if vcd is not None and (vcd == "-" or Path(vcd).is_char_device() or Path(vcd).is_fifo()):
         raise BadInputError("--vcd needs a file: its .gtkw view goes beside it")
     if vcd and engine == "compiled":
         raise BadInputError("--vcd is written by pysim: leave out --engine compiled")
@@ -86,7 +85,6 @@ def run_path(
 
     axes = points.shape[1]
     starts, ends = points[:-1], points[1:]
-    core = method.device(width, axes, **choices)
     summations = method.summations(method.golden(width, axes, **choices), np.abs(ends - starts))
     limit = int(summations.sum()) + _OVERHEAD * (len(starts) + 1)
     contour, pace, picture = LineContour(starts, ends), Pace(), PathPlot(points)
@@ -97,6 +95,7 @@ def run_path(
         vcd_part = outputs.place(vcd) if vcd is not None else None
         view = outputs.open(str(Path(vcd).with_suffix(".gtkw"))) if vcd is not None else None
         vcd_file = outputs.write(vcd_part) if vcd_part else None
+        core = method.device(width, axes, **choices)
         if progress:
             progress(0, limit)
         rows = csv.writer(trace_file, lineterminator="\n") if trace_file else None
@@ -108,17 +107,16 @@ def run_path(
         stretches = simulate(
             core, blocks, limit=limit, engine=engine, watch=("reg_running",), vcd=vcd_file
         )
-        with closing(stretches):
-            for stretch in stretches:
-                when, reached, errors = contour.follow(stretch)
-                pace.follow(stretch)
-                if rows:
-                    rows.writerows(np.column_stack([when, reached]).tolist())
-                if plot_part:
-                    picture.follow(reached, errors)
-                clocks += stretch.ran
-                if progress:
-                    progress(clocks, limit)
+        for stretch in stretches:
+            when, reached, errors = contour.follow(stretch)
+            pace.follow(stretch)
+            if rows:
+                rows.writerows(np.column_stack([when, reached]).tolist())
+            if plot_part:
+                picture.follow(reached, errors)
+            clocks += stretch.ran
+            if progress:
+                progress(clocks, limit)
         summary = {
             "method": method.name,
             **core.parameters,
@@ -139,7 +137,8 @@ def run_path(
             vcd_file.close()
             write_view(view, vcd_part, Path(vcd).name, core)
         if plot_part:
-            picture.save(plot_part, kind, f"{method.name}, {width} bits, {say_choices(choices)}")
+            chosen = say_choices({name: core.parameters[name] for name in method.choices})
+            picture.save(plot_part, kind, f"{method.name}, {width} bits, {chosen}")
         if json_file:
             json.dump(summary, json_file, indent=2)
             json_file.write("\n")

@@ -1,9 +1,6 @@
 """Seeded stall patterns: the same on every engine, and a function of the clock alone."""
 
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 __all__ = ["NO_STALLS", "Stalls"]
 
@@ -37,6 +34,8 @@ class Stalls:
     gap: float = 0.0
 
     def __post_init__(self):
+        if not 0 <= self.seed <= _MASK:
+            raise ValueError(f"seed is {self.seed}: choose a whole number from 0 to 2^64 - 1")
         for what, value in (("stall", self.stall), ("gap", self.gap)):
             if not 0 <= value < 1:
                 raise ValueError(
@@ -60,13 +59,6 @@ class Stalls:
     def offers(self, clock: int) -> bool:
         """Say whether a new block may be offered in ``clock``, counted from reset."""
         return not self.gap_below or _draw(self.seed, clock, 1) >= self.gap_below
-
-    def ready_lanes(self, lanes: int, clock: int) -> Any:
-        """Give ``ready`` of ``lanes`` patterns with seeds counted up from this one, as 0 and 1."""
-        if not self.stall_below:
-            return np.ones(lanes, dtype=np.int64)
-        patterns = (Stalls(self.seed + lane, self.stall) for lane in range(lanes))
-        return np.array([pattern.ready(clock) for pattern in patterns], dtype=np.int64)
 
 
 NO_STALLS = Stalls()

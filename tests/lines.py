@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from itertools import pairwise
 from math import sqrt
 
 
@@ -37,7 +38,7 @@ def path_steps(
     and one more behind a block that moved.
     """
     first, behind_a_move = 2, False
-    for start, end in zip(points, points[1:], strict=False):
+    for start, end in pairwise(points):
         steps = list(line_steps(start, end, width=width, normalize=normalize, preload=preload))
         for t, point in steps:
             yield first + t, point

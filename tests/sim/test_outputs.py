@@ -2,13 +2,14 @@ import errno
 import os
 import resource
 import sys
+from pathlib import Path
 
 import pytest
 
 from discreta.sim.outputs import Outputs
 
 
-class OutputsFailed(Exception):
+class HalfwayError(Exception):
     """Raised in the middle."""
 
 
@@ -18,7 +19,7 @@ def _in_folder(tmp_path, monkeypatch):
 
 
 def there():
-    return sorted(os.listdir())
+    return sorted(path.name for path in Path().iterdir())
 
 
 def test_files_come_all_together_at_the_end(tmp_path):
@@ -35,7 +36,7 @@ def test_files_come_all_together_at_the_end(tmp_path):
     assert (tmp_path / "b.txt").read_text() == "new"
 
 
-@pytest.mark.parametrize("failure", [OutputsFailed, KeyboardInterrupt, SystemExit])
+@pytest.mark.parametrize("failure", [HalfwayError, KeyboardInterrupt, SystemExit])
 def test_nothing_is_left_when_it_fails(tmp_path, failure):
     (tmp_path / "b.txt").write_text("old")
 
@@ -159,7 +160,7 @@ def test_a_file_that_may_not_be_written(tmp_path, monkeypatch):
     (tmp_path / "old.txt").write_text("old")
     (tmp_path / "old.txt").chmod(0o444)
     # The system lets root write everywhere: the answer is what everybody else gets.
-    monkeypatch.setattr(os, "access", lambda path, mode: not (mode & os.W_OK))
+    monkeypatch.setattr(os, "access", lambda _, mode: not (mode & os.W_OK))
     with Outputs() as outputs, pytest.raises(PermissionError) as raised:
         outputs.open("old.txt")
     assert raised.value.strerror == "the file is read-only; choose another name"

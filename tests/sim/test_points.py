@@ -1,4 +1,5 @@
 import re
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -37,26 +38,21 @@ def test_a_line_is_refused_just_when_there_is_no_room(case):
     width, start, end = case
     inside = all(-(2**width) <= value <= 2**width - 1 for value in (*start, *end))
     short = all(abs(b - a) <= 2**width - 1 for a, b in zip(start, end, strict=True))
+    complaint = ""
     try:
         check_line(start, end, width)
     except BadInputError as error:
-        assert not (inside and short)
-        # The cure that it names is one: the next width that has room for what it complains of.
-        if cure := re.search(r"give --width (\d+)$", str(error)):
-            assert int(cure[1]) == width + 1
-        else:
-            assert width == 32
-            assert str(error).endswith("no device has more than 32 bits")
-        with fails_with(str(error)):
-            check_path(np.array([start, end]), width)
-    else:
-        assert inside
-        assert short
+        complaint = str(error)
+    assert (complaint == "") == (inside and short)
+    # The cure that it names is one: the next width has room for what it complains of.
+    cure = f"give --width {width + 1}" if width < 32 else "no device has more than 32 bits"
+    assert complaint == "" or complaint.endswith(f"; {cure}")
+    with fails_with(complaint) if complaint else nullcontext():
         check_path(np.array([start, end]), width)
 
 
 def test_a_path_is_refused_for_its_first_bad_line():
-    good = [[0, 0], [255, -256], [1, -1], [-254, 254]]
+    good = [[0, -1], [255, -256], [1, -1], [-254, 254]]
     check_path(np.array(good), 8)
     with fails_with(
         "the line from 0,-1 to 0,255 is 256 steps long: width 8 has room for 255; give --width 9"
@@ -164,10 +160,11 @@ def test_what_is_no_file(tmp_path):
 def test_any_bytes_are_read_or_refused(tmp_path_factory, content):
     file = tmp_path_factory.getbasetemp() / "any.csv"
     file.write_bytes(content)
+    points, complaint = None, ""
     try:
         points = read_points(str(file), 16)
     except BadInputError as error:
-        assert len(str(error)) < 400
-        assert "\n" not in str(error).replace(str(file), "")
-    else:
-        assert len(points) >= 2
+        complaint = str(error).replace(str(file), "")
+    assert complaint if points is None else len(points) >= 2
+    assert len(complaint) < 300
+    assert "\n" not in complaint

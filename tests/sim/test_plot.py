@@ -1,0 +1,167 @@
+import re
+from itertools import pairwise
+from xml.etree import ElementTree
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from discreta.sim.plot import PathPlot, picture_format
+from discreta.sim.points import BadInputError
+from tests.lines import distance, line_steps
+
+CORNERS = np.array([(0, 0), (20, 9), (-7, -13), (-7, -13), (0, 0)])
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def steps_of(corners):
+    """Give the points behind every step, and their errors."""
+    points, errors = [], []
+    for start, end in pairwise(corners.tolist()):
+        for _, point in line_steps(start, end, width=8, normalize=True, preload="half"):
+            points.append(point)
+            errors.append(distance(point, start, end))
+    return np.array(points).reshape(-1, corners.shape[1]), np.array(errors)
+
+
+def picture(tmp_path, corners, points, errors, *, cuts=(), kind=".svg"):
+    plot = PathPlot(corners)
+    for part, error in zip(np.split(points, cuts), np.split(errors, cuts), strict=True):
+        plot.follow(part, error)
+    path = tmp_path / f"picture{kind}"
+    plot.save(path, kind, "a path")
+    return path.read_bytes()
+
+
+def vertices(svg, name):
+    """Give the vertices of a curve, in the picture's units, upwards."""
+    root = ElementTree.fromstring(svg)
+    (group,) = (group for group in root.iter(f"{SVG}g") if group.get("id") == name)
+    curve = next(group.iter(f"{SVG}path")).get("d")
+    assert curve is not None
+    pairs = re.findall(r"[ML] (\S+) (\S+)", curve)
+    return np.array(pairs, dtype=float) * (1, -1)
+
+
+def markers(svg, name):
+    """Give the places of a curve's markers; the curve itself ends where the window does."""
+    root = ElementTree.fromstring(svg)
+    (group,) = (group for group in root.iter(f"{SVG}g") if group.get("id") == name)
+    places = [(use.get("x"), use.get("y")) for use in group.iter(f"{SVG}use")]
+    return np.array(places, dtype=float) * (1, -1)
+
+
+def texts(svg):
+    return [node.text for node in ElementTree.fromstring(svg).iter(f"{SVG}text")]
+
+
+def scale(seen, known):
+    """Give the function from the picture's units to steps, from points that are known."""
+    low, high = known.argmin(axis=0), known.argmax(axis=0)
+    column = np.arange(known.shape[1])
+    factor = (known[high, column] - known[low, column]) / (seen[high, column] - seen[low, column])
+    return lambda points: known[low, column] + (points - seen[low, column]) * factor
+
+
+def test_the_staircase_is_the_trace(tmp_path):
+    points, errors = steps_of(CORNERS)
+    svg = picture(tmp_path, CORNERS, points, errors)
+    true = vertices(svg, "true")
+    assert len(true) == len(CORNERS)
+    in_steps = scale(true, CORNERS)
+    assert in_steps(true) == pytest.approx(CORNERS, abs=1e-3)
+    trace = np.vstack([CORNERS[:1], points])
+    assert len(trace) < 128  # above, lines are simplified
+    assert in_steps(vertices(svg, "steps")) == pytest.approx(trace, abs=1e-3)
+    # One unit of both axes is as long.
+    one = np.diff([in_steps(np.zeros(2)), in_steps(np.ones(2))], axis=0)[0]
+    assert one[0] == pytest.approx(one[1], rel=1e-3)
+
+
+def test_the_curve_of_the_error(tmp_path):
+    points, errors = steps_of(CORNERS)
+    svg = picture(tmp_path, CORNERS, points, errors)
+    known = np.column_stack([np.arange(len(points) + 1), [0, *errors]])
+    seen = vertices(svg, "error")
+    assert scale(seen, known)(seen) == pytest.approx(known, abs=2e-3)
+    assert "distance from the true path" in texts(svg)
+
+
+def test_the_window_stands_at_the_largest_error(tmp_path):
+    points, errors = steps_of(CORNERS)
+    svg = picture(tmp_path, CORNERS, points, errors)
+    worst = int(np.argmax(errors))
+    near = np.vstack([CORNERS[:1], points])[max(0, worst + 1 - 12) : worst + 1 + 13]
+    seen = markers(svg, "near")
+    assert scale(seen, near)(seen) == pytest.approx(near, abs=1e-3)
+    assert f"largest error: {errors[worst]:.4f} step" in texts(svg)
+
+
+@pytest.mark.parametrize("kind", [".svg", ".png"])
+def test_the_same_path_gives_the_same_bytes(tmp_path, kind):
+    """However the steps come, and whatever the user likes his own plots to be."""
+    points, errors = steps_of(CORNERS)
+    first = picture(tmp_path, CORNERS, points, errors, kind=kind)
+    worst = int(np.argmax(errors))
+    for cuts in ([0, 0], [1, 2, 3], [worst], [worst + 1], [worst - 3, worst + 2, worst + 9]):
+        assert picture(tmp_path, CORNERS, points, errors, cuts=cuts, kind=kind) == first
+    with mpl.rc_context({"lines.linewidth": 7, "font.size": 30, "figure.facecolor": "red"}):
+        assert picture(tmp_path, CORNERS, points, errors, kind=kind) == first
+
+
+def test_another_path_gives_another_picture(tmp_path):
+    points, errors = steps_of(CORNERS)
+    first = picture(tmp_path, CORNERS, points, errors)
+    points[30] += (0, 1)
+    assert picture(tmp_path, CORNERS, points, errors) != first
+
+
+@pytest.mark.parametrize("cuts", [[], [1, 2, 150_000, 299_999], list(range(0, 300_000, 65_536))])
+def test_long_paths_keep_their_end_and_the_largest_error(tmp_path, cuts):
+    """Hundreds of thousands of steps: a picture of bounded size that still shows a single peak."""
+    count = 300_000
+    corners = np.array([(0, 0), (count, 0), (count, count)])
+    points = np.column_stack([np.arange(1, count + 1), np.zeros(count, dtype=int)])
+    errors = np.full(count, 0.25)
+    errors[100_000:150_000] = 0
+    peak = 234_567
+    errors[peak] = 0.75
+    points[peak, 1] = 1
+    svg = picture(tmp_path, corners, points, errors, cuts=cuts)
+    assert len(svg) < 1_000_000
+    heights = np.unique(vertices(svg, "error")[:, 1])
+    assert heights[-1] - heights[0] == pytest.approx(
+        3 * (np.median(vertices(svg, "error")[:, 1]) - heights[0]), rel=1e-3
+    )
+    in_steps = scale(vertices(svg, "true"), corners)
+    steps = in_steps(vertices(svg, "steps"))
+    assert steps[0] == pytest.approx((0, 0), abs=200)
+    assert steps[-1] == pytest.approx((count, 0), abs=200)
+    assert "distance from the true path, the largest of every 256 steps" in texts(svg)
+
+
+def test_more_axes_say_which_are_drawn(tmp_path):
+    corners = np.array([(0, 0, 0, 0), (3, -9, 2, 1)])
+    points, errors = steps_of(corners)
+    svg = picture(tmp_path, corners, points, errors)
+    assert "a path; x and y of xyza" in texts(svg)
+    in_steps = scale(vertices(svg, "true"), corners[:, :2])
+    trace = np.vstack([corners[:1], points])[:, :2]
+    assert in_steps(vertices(svg, "steps")) == pytest.approx(trace, abs=1e-3)
+
+
+@pytest.mark.parametrize("corners", [[(5, 5), (5, 5)], [(5, 5)] * 4, [(0, 0), (1, 0)]])
+def test_paths_of_no_steps_or_one(tmp_path, corners):
+    corners = np.array(corners)
+    svg = picture(tmp_path, corners, *steps_of(corners))
+    moves = bool(np.any(corners[0] != corners[-1]))
+    assert any("largest error" in (text or "") for text in texts(svg)) == moves
+
+
+def test_names_of_pictures():
+    assert picture_format("a/b.c.SVG") == ".svg"
+    assert picture_format("x.png") == ".png"
+    for name in ("x.pdf", "x", "-", ".svg"):
+        message = f"^--plot {re.escape(name)}: choose a name that ends in .png or .svg$"
+        with pytest.raises(BadInputError, match=message):
+            picture_format(name)

@@ -1,0 +1,101 @@
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from discreta.sim.methods import METHODS
+from discreta.sim.points import BadInputError
+from discreta.sim.run import run_path, say_choices
+from tests.lines import distance, path_steps
+
+LINEAR = METHODS["linear"]
+POINTS = np.array([(0, 0), (20, 9), (-7, -13), (-7, -12), (0, 0)])
+
+
+def worst(points, **options):
+    """Give the largest error and the number of steps, worked out line by line."""
+    largest, count = 0.0, 0
+    for start, end in zip(points[:-1].tolist(), points[1:].tolist(), strict=True):
+        for _, point in path_steps([start, end], **options):
+            largest = max(largest, distance(point, start, end))
+            count += 1
+    return largest, count
+
+
+def test_one_call_runs_a_path(tmp_path):
+    trace, json_file = tmp_path / "t.csv", tmp_path / "s.json"
+    seen = []
+    summary = run_path(
+        POINTS,
+        LINEAR,
+        width=6,
+        engine="pysim",
+        trace=str(trace),
+        summary_file=str(json_file),
+        progress=lambda *counts: seen.append(counts),
+        normalize=False,
+        preload="zero",
+    )
+    options = {"width": 6, "normalize": False, "preload": "zero"}
+    expected = list(path_steps(POINTS.tolist(), **options))
+    rows = list(csv.reader(trace.read_text().splitlines()))
+    assert rows[:2] == [["clock", "x", "y"], ["0", "0", "0"]]
+    numbers = [[int(cell) for cell in row] for row in rows[2:]]
+    assert [(clock, tuple(point)) for clock, *point in numbers] == expected
+    largest, steps = worst(POINTS, **options)
+    assert summary == {
+        "method": "linear",
+        "width": 6,
+        "axes": 2,
+        "normalize": False,
+        "preload": "zero",
+        "engine": "pysim",
+        "clocks": expected[-1][0],
+        "summations": 4 * 64,
+        "steps": steps,
+        "clocks per step": round(expected[-1][0] / steps, 4),
+        "largest error": round(largest, 4),
+        "largest error at": summary["largest error at"],
+        "segments": 4,
+        "support points hit": 4,
+        "path closed": True,
+        "clocks lost between blocks": 0,
+        "end point reached": True,
+    }
+    assert json.loads(json_file.read_text()) == summary
+    at = tuple(summary["largest error at"])
+    errors = [
+        distance(at, start, end)
+        for start, end in zip(POINTS[:-1].tolist(), POINTS[1:].tolist(), strict=True)
+    ]
+    assert any(error == pytest.approx(largest) for error in errors)
+    # The bar begins with nothing done, and goes on by clocks up to a total that is enough.
+    (first, total), *_, (last, _) = seen
+    assert first == 0
+    assert expected[-1][0] < last <= total
+    assert {most for _, most in seen} == {total}
+
+
+@pytest.mark.usefixtures("compiled_engine")
+def test_both_engines_write_the_same(tmp_path):
+    files = {}
+    for engine in ("pysim", "compiled"):
+        names = {kind: str(tmp_path / f"{engine}.{kind}") for kind in ("csv", "svg")}
+        summary = run_path(
+            POINTS, LINEAR, width=6, engine=engine, trace=names["csv"], plot=names["svg"]
+        )
+        assert summary.pop("engine") == engine
+        files[engine] = [summary, *(Path(name).read_bytes() for name in names.values())]
+    assert files["pysim"] == files["compiled"]
+
+
+def test_points_without_room_are_refused():
+    with pytest.raises(BadInputError, match=r"^coordinate 20 is out of range: width 4 has room"):
+        run_path(POINTS, LINEAR, width=4)
+
+
+def test_choices_in_words():
+    assert say_choices({"normalize": True, "preload": "half"}) == "normalize, preload half"
+    assert say_choices({"preload": "zero", "normalize": False}) == "preload zero, no normalize"

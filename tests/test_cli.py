@@ -1,0 +1,811 @@
+"""The command line, as its users type it."""
+
+import csv
+import json
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from importlib import metadata
+from itertools import pairwise
+from pathlib import Path
+
+import click
+import pytest
+from amaranth import Module, Signal
+from amaranth.lib import stream
+from amaranth.lib.wiring import In, Out
+
+from discreta import cli
+from discreta.hdl.contract import ErrorCode, Part, point_layout, step_layout
+from discreta.hdl.linear import Linear
+from discreta.hdl.quadrant import line_block_layout
+from discreta.hdl.verilog import verilog
+from discreta.sim.methods import METHODS
+from discreta.sim.smt import Verdict
+from tests.lines import distance, path_steps
+
+LINE = ["simulate", "line", "--start", "0,0", "--end", "20,9"]
+PYSIM = ["--engine", "pysim"]
+BORDER = Path(__file__).parents[1] / "examples/bulgaria.csv"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Work in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def discreta(capfd):
+    """Run the command line here; give exit code, standard output and standard error."""
+
+    def run(*arguments):
+        code = cli._run([str(argument) for argument in arguments])
+        sys.stdout.flush()
+        out, err = capfd.readouterr()
+        return code, out, err
+
+    return run
+
+
+def snapshot(folder):
+    return {
+        str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
+        for path in folder.rglob("*")
+    }
+
+
+def write_csv(name, points):
+    letters = "xyzabc"[: len(points[0])]
+    rows = [",".join(letters), *(",".join(map(str, point)) for point in points)]
+    Path(name).write_text("\n".join(rows) + "\n")
+
+
+def read_trace(text):
+    """Give the axes, and (clock, point) of every row."""
+    header, *rows = csv.reader(text.splitlines())
+    assert header[0] == "clock"
+    numbers = [[int(cell) for cell in row] for row in rows]
+    return header[1:], [(clock, tuple(point)) for clock, *point in numbers]
+
+
+def table(text):
+    """Give what a summary says, by its names."""
+    return dict(re.split(r"  +", line, maxsplit=1) for line in text.splitlines())
+
+
+# --- what it draws
+
+
+def exercise_3(xh, yh, xk, yk):
+    """Yield (summations, x, y) whenever exercise 3's program draws a point.
+
+    Its labels and cells in 16 bits; AX and the flags are left out, CX and DX hold the point.
+    """
+    ddx, ddy = xk - xh, yk - yh
+    assert ddx >= 0  # JNC M1, else JMP EXIT
+    assert ddy >= 0  # JNC M2, else JMP EXIT
+    kox, koy = ddx, ddy
+    cx, dx = xh, yh
+    sx = sy = summations = 0
+    while True:
+        # L1
+        flag = 0
+        yield summations, cx, dx
+        while not flag:
+            # L2
+            if kox == 0 and koy == 0:
+                return
+            summations += 1
+            if kox != 0:
+                # L6
+                sx += ddx
+                if sx >= 0x10000:
+                    sx -= 0x10000
+                    cx, kox, flag = cx + 1, kox - 1, flag + 1
+            # L3
+            if koy != 0:
+                # L5
+                sy += ddy
+                if sy >= 0x10000:
+                    sy -= 0x10000
+                    dx, koy, flag = dx + 1, koy - 1, flag + 1
+            # L4
+
+
+def test_exercise_3(discreta):
+    """The textbook's own line, point by point and clock by clock."""
+    options = ["--width", 16, "--no-normalize", "--preload", "zero", *PYSIM]
+    code, out, err = discreta(
+        *("simulate", "line", "--start", "0,0", "--end", "200,99"), *options, "--trace", "-"
+    )
+    assert code == 0
+    axes, rows = read_trace(out)
+    assert axes == ["x", "y"]
+    program = list(exercise_3(0, 0, 200, 99))
+    points = [point for _, point in rows]
+    assert points == [(x, y) for _, x, y in program]
+    assert len(points) == 299
+    assert points[:8] == [(0, 0), (1, 0), (2, 0), (2, 1), (3, 1), (4, 1), (4, 2), (5, 2)]
+    # The last step is a diagonal, the only one.
+    moves = [(c - a, d - b) for (a, b), (c, d) in pairwise(points)]
+    assert [index for index, move in enumerate(moves) if move == (1, 1)] == [297]
+    # A step leaves in the second clock after its summation's number: accepted, started, summed.
+    assert [clock - 2 for clock, _ in rows[1:]] == [t for t, _, _ in program[1:]]
+    assert program[-1][0] == 65536
+    said = table(err)
+    assert said["summations"] == "65536"
+    assert said["steps"] == "298"
+    assert said["end point reached"] == "yes"
+
+
+def test_the_border(discreta):
+    """All 178 segments through the RTL: every support point hit, closed, no clock lost."""
+    with BORDER.open() as lines:
+        points = [tuple(map(int, row)) for row in list(csv.reader(lines))[1:]]
+    assert len(points) == 179
+    assert points[0] == points[-1]
+    code, out, err = discreta("simulate", "path", BORDER, *PYSIM, "--trace", "t.csv", "--json", "-")
+    assert code == 0
+    summary = json.loads(out)
+    _, rows = read_trace(Path("t.csv").read_text())
+
+    # Every clock and point of a run that loses no clock, from the closed form of the lines.
+    assert rows == [(0, points[0]), *path_steps(points, width=16)]
+    visited = iter(point for _, point in rows)
+    assert all(point in visited for point in points)  # in their order
+    assert rows[-1][1] == points[0]
+
+    expected = {"segments": 178, "support points hit": 178, "path closed": True}
+    expected |= {"clocks lost between blocks": 0, "end point reached": True}
+    expected |= {"clocks": rows[-1][0], "steps": len(rows) - 1}
+    expected |= {"summations": rows[-1][0] - 1 - 178}
+    expected |= {"clocks per step": round(rows[-1][0] / (len(rows) - 1), 4)}
+    errors = []
+    for start, end in pairwise(points):
+        for _, point in path_steps([start, end], width=16):
+            errors.append((distance(point, start, end), point))
+    expected |= {"largest error": round(max(errors)[0], 4)}
+    assert summary == summary | expected
+    at = tuple(summary["largest error at"])
+    assert any(point == at and error > max(errors)[0] - 1e-9 for error, point in errors)
+    assert table(err)["support points hit"] == "178"
+
+
+LINES = {
+    "negative": [(-5, -7), (0, 0)],
+    "every sign": [(7, -3), (-20, 11)],
+    "along an axis": [(3, 3), (3, -9)],
+    "three axes": [(0, 0, 0), (11, -4, 7)],
+    "four axes": [(1, 2, 3, 4), (4, 3, 2, 1)],
+    "five axes": [(0, 0, 0, 0, 0), (0, 0, 0, 0, -3)],
+    "six axes": [(-1, -2, -3, -4, -5, -6), (6, 5, 4, 3, 2, 1)],
+    "the longest": [(-32, 15), (-1, -16)],
+}
+
+
+@pytest.mark.parametrize("normalize", [True, False])
+@pytest.mark.parametrize("preload", ["zero", "half"])
+@pytest.mark.parametrize(("start", "end"), LINES.values(), ids=LINES)
+def test_lines(discreta, start, end, normalize, preload):
+    words = [",".join(map(str, point)) for point in (start, end)]
+    code, out, err = discreta(
+        *("simulate", "line", "--start", words[0], "--end", words[1], "--width", 5),
+        *("--preload", preload, "--normalize" if normalize else "--no-normalize"),
+        *(*PYSIM, "--trace", "-"),
+    )
+    assert code == 0
+    axes, rows = read_trace(out)
+    assert axes == list("xyzabc")[: len(start)]
+    steps = list(path_steps([start, end], width=5, normalize=normalize, preload=preload))
+    assert rows == [(0, start), *steps]
+    said = table(err)
+    errors = [distance(point, start, end) for _, point in steps]
+    assert said["largest error"] == f"{max(errors):.4f}"
+    assert said["axes"] == str(len(start))
+
+
+def test_a_line_of_no_length(discreta, folder):
+    options = ["--trace", "t.csv", "--plot", "p.svg", "--json", "s.json", *PYSIM]
+    code, out, err = discreta("simulate", "line", "--start", "5,-5", "--end", "5,-5", *options)
+    assert (code, err) == (0, "")
+    assert read_trace((folder / "t.csv").read_text())[1] == [(0, (5, -5))]
+    said = table(out)
+    assert (said["steps"], said["clocks"], said["clocks per step"]) == ("0", "0", "-")
+    assert (said["largest error"], said["largest error at"]) == ("0.0000", "5,-5")
+    assert said["end point reached"] == "yes"
+    assert json.loads((folder / "s.json").read_text())["clocks per step"] is None
+    assert b"<svg" in (folder / "p.svg").read_bytes()
+
+
+PATHS = {
+    "doubles": ([(0, 0), (0, 0), (3, 1), (3, 1), (3, 1), (4, 1), (0, 0), (0, 0)], 3),
+    "steps alone": ([(0, 0), (1, 0), (1, 1), (1, 1), (0, 0)], 2),
+    "all the same": ([(3, 3)] * 4, 0),
+}
+
+
+@pytest.mark.parametrize(("points", "lost"), PATHS.values(), ids=PATHS)
+def test_points_that_come_twice(discreta, points, lost):
+    write_csv("p.csv", points)
+    code, out, _ = discreta("simulate", "path", "p.csv", "--json", "-", "--trace", "t.csv", *PYSIM)
+    assert code == 0
+    _, rows = read_trace(Path("t.csv").read_text())
+    assert [point for _, point in rows] == [
+        points[0],
+        *(point for _, point in path_steps(points, width=16)),
+    ]
+    summary = json.loads(out)
+    assert summary["segments"] == summary["support points hit"] == len(points) - 1
+    assert summary["clocks lost between blocks"] == lost
+    assert summary["path closed"]
+    assert summary["end point reached"]
+
+
+# --- what it writes
+
+
+def test_only_data_on_the_standard_output(discreta):
+    _, plain, quiet = discreta(*LINE, *PYSIM)
+    assert quiet == ""
+    code, out, err = discreta(*LINE, *PYSIM, "--trace", "-")
+    assert code == 0
+    assert read_trace(out)[1][-1][1] == (20, 9)
+    assert table(err).keys() == table(plain).keys()
+    code, out, err = discreta(*LINE, *PYSIM, "--json", "-")
+    assert code == 0
+    summary = json.loads(out)
+    # The same names, and the time beside them, which is another one every time.
+    assert [*summary, "time"] == list(table(err))
+    assert err.splitlines()[:-1] == plain.splitlines()[:-1]
+    assert all("  " in line and line == line.rstrip() for line in err.splitlines())
+
+
+def test_all_files_at_once(discreta, folder):
+    options = ["--trace", "t.csv", "--json", "s.json", "--vcd", "w.vcd", "--plot", "p.png"]
+    code, out, err = discreta(*LINE, *options)
+    assert (code, err) == (0, "")
+    assert table(out)["engine"] == "pysim"
+    assert sorted(snapshot(folder)) == ["p.png", "s.json", "t.csv", "w.gtkw", "w.vcd"]
+    assert '[dumpfile] "w.vcd"' in (folder / "w.gtkw").read_text()
+    assert (folder / "p.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_picture_is_the_same_whatever_the_order_of_options(discreta, folder):
+    line = [*LINE, *PYSIM, "--width", "6"]
+    discreta(*line, "--plot", "a.svg", "--preload", "zero", "--no-normalize")
+    discreta(*line, "--no-normalize", "--plot", "b.svg", "--preload", "zero")
+    assert (folder / "a.svg").read_bytes() == (folder / "b.svg").read_bytes()
+
+
+def test_verilog(discreta, folder):
+    code, out, err = discreta("verilog", "linear", "--width", "4", "--axes", "3")
+    assert (code, err) == (0, "")
+    assert out == verilog(Linear(4, 3), "discreta_linear")
+    options = ["--width", "4", "--axes", "3", "--output", "line.v"]
+    assert discreta("verilog", "linear", *options) == (0, "", "")
+    assert (folder / "line.v").read_text() == out
+
+
+def test_methods(discreta):
+    code, out, err = discreta("methods")
+    assert (code, err) == (0, "")
+    _, *rows = out.splitlines()
+    assert [row.split()[0] for row in rows] == list(METHODS)
+    for row, method in zip(rows, METHODS.values(), strict=True):
+        assert method.summary in row
+        assert method.error_bound in row
+        assert method.clocks_per_step in row
+
+
+def test_version(discreta):
+    assert discreta("--version") == (0, f"discreta, version {metadata.version('discreta')}\n", "")
+
+
+@pytest.mark.usefixtures("compiled_engine")
+def test_survey(discreta):
+    code, out, err = discreta("survey", "linear", "--width", "4")
+    assert (code, err) == (0, "")
+    title, _, *rows, time_taken = out.splitlines()
+    assert title == "linear, width 4: all 256 lines, every register compared"
+    assert [re.split(r"  +", row)[0] for row in rows] == [
+        "normalize, preload half",
+        "normalize, preload zero",
+        "no normalize, preload half",
+        "no normalize, preload zero",
+    ]
+    lengths = [(x, y) for x in range(16) for y in range(16)]
+    for row in rows:
+        variant, largest, line, _, _, missed = re.split(r"  +", row.strip())
+        preload = variant.split()[-1]
+        options = {"width": 4, "normalize": not variant.startswith("no "), "preload": preload}
+        errors = [
+            distance(point, (0, 0), length)
+            for length in lengths
+            for _, point in path_steps([(0, 0), length], **options)
+        ]
+        assert largest == f"{max(errors):.4f}"
+        assert max(map(abs, map(int, line.split(",")))) < 16
+        assert missed == "0"
+    assert re.fullmatch(r"\d+ clocks of RTL in \d+\.\d s, \d+\.\d million a second", time_taken)
+
+
+def test_prove(discreta):
+    code, out, err = discreta("prove", "linear", "--width", "4")
+    assert (code, err) == (0, "")
+    *lines, last = out.splitlines()
+    assert [line for line in lines if not line.startswith("  proven ")] == [
+        f"linear, width 4, {normalize}, preload {preload}"
+        for normalize in ("normalize", "no normalize")
+        for preload in ("half", "zero")
+    ]
+    proven = sum(line.startswith("  proven ") for line in lines)
+    assert re.fullmatch(rf"{proven} proven, all hold, \d+\.\d s", last)
+
+
+# --- what does not hold
+
+
+def test_a_proof_that_fails(discreta, monkeypatch):
+    def prove_variant(name, width, variant):
+        holds = variant != {"normalize": False, "preload": "zero"}
+        return [
+            Verdict(f"{name} ends at {width}", True, 0.5, ""),
+            Verdict("it always ends", holds, 0.25, "" if holds else "dx = 3"),
+        ]
+
+    monkeypatch.setattr("discreta.sim.prover.prove_variant", prove_variant)
+    monkeypatch.setattr(cli, "ProcessPoolExecutor", ThreadPoolExecutor)
+    code, out, err = discreta("prove", "linear", "--width", "4")
+    assert (code, err) == (1, "")
+    assert out.splitlines()[-5:-1] == [
+        "linear, width 4, no normalize, preload zero",
+        "  proven   0.50 s  linear ends at 4",
+        "  FAILED   0.25 s  it always ends",
+        "         dx = 3",
+    ]
+    assert out.splitlines()[-1].startswith("7 proven, NOT ALL HOLD, ")
+
+
+class Standing(Part):
+    """Answers every block and moves nothing."""
+
+    def __init__(self, width, axes, **choices):
+        super().__init__(
+            {
+                "blocks": In(stream.Signature(line_block_layout(width, axes))),
+                "steps": Out(stream.Signature(step_layout(axes))),
+                "position": Out(point_layout(width, axes)),
+                "busy": Out(1),
+                "done": Out(1),
+                "error": Out(ErrorCode),
+            }
+        )
+        self.running = Signal(name="running")
+        self.registers = {"running": self.running}
+        self.parameters = {"width": width, "axes": axes, **choices}
+
+    def elaborate(self, _):
+        m = Module()
+        m.d.comb += [self.blocks.ready.eq(1), self.done.eq(self.running)]
+        m.d.sync += self.running.eq(self.blocks.valid)
+        return m
+
+
+class Silent(Standing):
+    """Never answers."""
+
+    def elaborate(self, _):
+        m = Module()
+        m.d.comb += self.blocks.ready.eq(1)
+        m.d.sync += self.running.eq(1)
+        return m
+
+
+def test_an_end_that_is_not_reached(discreta, monkeypatch, folder):
+    """Exit 1, with everything written: that is where to look for why."""
+    monkeypatch.setitem(METHODS, "linear", replace(METHODS["linear"], device=Standing))
+    code, out, err = discreta(*LINE, *PYSIM, "--trace", "t.csv")
+    assert (code, err) == (1, "")
+    assert table(out)["end point reached"] == "no"
+    assert table(out)["support points hit"] == "0"
+    assert read_trace((folder / "t.csv").read_text())[1] == [(0, (0, 0))]
+
+
+def test_a_device_that_does_not_answer(discreta, monkeypatch, folder):
+    monkeypatch.setitem(METHODS, "linear", replace(METHODS["linear"], device=Silent))
+    code, out, err = discreta(*LINE, *PYSIM, "--trace", "t.csv")
+    assert (code, out) == (1, "")
+    # 32 summations, and some clocks around them.
+    message = r"discreta: 0 of 1 blocks are answered after (\d+) clocks, where \1 must do\n"
+    match = re.fullmatch(message, err)
+    assert match
+    assert 32 < int(match[1]) <= 42
+    assert snapshot(folder) == {}
+
+
+# --- bad input
+
+POINT = "is not a point: give 2 to 6 whole numbers of steps with commas between, like 200,99"
+WIDTH = "choose a whole number from 4 to 32"
+ROOM = "is out of range: width 16 has room for -65536 to 65535; give --width"
+CELLS = "is not a point: give 2 whole numbers of steps"
+PATH_OF = ["simulate", "path"]
+BAD = {
+    # Methods and their options
+    "method": (
+        [*LINE, "--method", "circle"],
+        "Invalid value for '--method': there is no method 'circle': choose linear",
+    ),
+    "prove": (
+        ["prove", "linear", "circle"],
+        "Invalid value for 'METHOD...': there is no method 'circle': choose linear",
+    ),
+    "width 3": ([*LINE, "--width", "3"], f"Invalid value for '--width': width is 3: {WIDTH}"),
+    "width 33": ([*LINE, "--width", "33"], f"Invalid value for '--width': width is 33: {WIDTH}"),
+    "width x": ([*LINE, "--width", "x"], f"Invalid value for '--width': width is 'x': {WIDTH}"),
+    "width 8.0": (
+        ["verilog", "linear", "--width", "8.0"],
+        f"Invalid value for '--width': width is '8.0': {WIDTH}",
+    ),
+    "axes": (
+        ["verilog", "linear", "--axes", "7"],
+        "Invalid value for '--axes': number of axes is 7: choose a whole number from 2 to 6",
+    ),
+    # Points
+    "one axis": (
+        ["simulate", "line", "--start", "0,0", "--end", "5"],
+        f"Invalid value for '--end': '5' {POINT}",
+    ),
+    "a letter": ([*LINE, "--end", "5,x"], f"Invalid value for '--end': '5,x' {POINT}"),
+    "nothing": ([*LINE, "--end", ""], f"Invalid value for '--end': '' {POINT}"),
+    "seven axes": (
+        [*LINE, "--end", "1,2,3,4,5,6,7"],
+        f"Invalid value for '--end': '1,2,3,4,5,6,7' {POINT}",
+    ),
+    "a space": ([*LINE, "--start", "0,"], f"Invalid value for '--start': '0,' {POINT}"),
+    "too far": ([*LINE, "--end", "70000,3"], f"coordinate 70000 {ROOM} 17"),
+    "too far back": ([*LINE, "--start", "-65537,3"], f"coordinate -65537 {ROOM} 17"),
+    "too far for all": (
+        [*LINE, "--end", "0,5000000000", "--width", "32"],
+        "coordinate 5000000000 is out of range: width 32 has room for -4294967296 to 4294967295; "
+        "no device has more than 32 bits",
+    ),
+    "too long": (
+        [*LINE, "--start", "-40000,0", "--end", "40000,1"],
+        "the line from -40000,0 to 40000,1 is 80000 steps long: width 16 has room for 65535; "
+        "give --width 17",
+    ),
+    "axes apart": (
+        [*LINE, "--end", "1,2,3"],
+        "--start has 2 coordinates and --end has 3: give both as many",
+    ),
+    # Files to read
+    "csv letter": ([*PATH_OF, "letter.csv"], f"letter.csv, line 3: '5,a' {CELLS}"),
+    "csv short": ([*PATH_OF, "short.csv"], f"short.csv, line 4: '7' {CELLS}"),
+    "csv far": ([*PATH_OF, "far.csv"], f"far.csv, line 3: coordinate -70000 {ROOM} 17"),
+    "csv empty": (
+        [*PATH_OF, "empty.csv"],
+        "empty.csv is empty: give a line x,y and a support point in every line after it",
+    ),
+    "csv one point": (
+        [*PATH_OF, "one.csv"],
+        "one.csv has too few support points, 1: a path needs at least 2",
+    ),
+    "csv header": (
+        [*PATH_OF, "bare.csv"],
+        "bare.csv begins with '0,0': the first line must name the axes, x,y or up to x,y,z,a,b,c",
+    ),
+    "csv missing": (
+        [*PATH_OF, "no.csv"],
+        "cannot read no.csv: No such file or directory; name a CSV file",
+    ),
+    "csv folder": ([*PATH_OF, "in"], "cannot read in: Is a directory; name a CSV file"),
+    "csv binary": (
+        [*PATH_OF, "binary.csv"],
+        "binary.csv is not a CSV file in UTF-8: give a line x,y and a support point in every line "
+        "after it",
+    ),
+    # Files to write
+    "missing folder": (
+        [*LINE, "--trace", "no/t.csv"],
+        "cannot write no/t.csv: there is no folder no; make it first",
+    ),
+    "a folder": (
+        [*LINE, "--trace", "t.csv", "--json", "in"],
+        "cannot write in: it is a folder; give the name of a file",
+    ),
+    "no name": ([*LINE, "--trace", ""], "cannot write '': it is a folder; give the name of a file"),
+    "no name for a waveform": (
+        [*LINE, "--vcd", ""],
+        "cannot write '': it is a folder; give the name of a file",
+    ),
+    "verilog": (
+        ["verilog", "linear", "--output", "no/a.v"],
+        "cannot write no/a.v: there is no folder no; make it first",
+    ),
+    "picture": (
+        [*LINE, "--plot", "p.pdf"],
+        "--plot p.pdf: choose a name that ends in .png or .svg",
+    ),
+    "no picture on a pipe": (
+        [*LINE, "--plot", "-"],
+        "--plot -: choose a name that ends in .png or .svg",
+    ),
+    "no waveform on a pipe": (
+        [*LINE, "--vcd", "-"],
+        "--vcd needs a file: its .gtkw view goes beside it",
+    ),
+    "no waveform in a device": (
+        [*LINE, "--vcd", os.devnull],
+        "--vcd needs a file: its .gtkw view goes beside it",
+    ),
+    "waveform of the compiled engine": (
+        [*LINE, "--vcd", "w.vcd", "--engine", "compiled"],
+        "--vcd is written by pysim: leave out --engine compiled",
+    ),
+    "two on the standard output": (
+        [*LINE, "--trace", "-", "--json", "-"],
+        "--trace - and --json - would mix: send one of them to a file",
+    ),
+    "one file twice": (
+        [*LINE, "--trace", "a.csv", "--json", "in/../a.csv"],
+        "cannot write in/../a.csv: this command reads or writes it already; choose another name",
+    ),
+    "the view's file": (
+        [*LINE, "--vcd", "w.vcd", "--trace", "w.gtkw"],
+        "cannot write w.gtkw: this command reads or writes it already; choose another name",
+    ),
+    "the file that is read": (
+        [*PATH_OF, "good.csv", "--trace", "./good.csv"],
+        "cannot write ./good.csv: this command reads or writes it already; choose another name",
+    ),
+}
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD.values(), ids=BAD)
+def test_bad_input(discreta, folder, arguments, message):
+    """One clear line, exit 2, nothing written."""
+    (folder / "in").mkdir()
+    write_csv("good.csv", [(0, 0), (5, 3)])
+    write_csv("letter.csv", [(0, 0), (5, "a")])
+    write_csv("short.csv", [(0, 0), (5, 3), (7,)])
+    write_csv("far.csv", [(0, 0), (-70000, 3)])
+    write_csv("one.csv", [(0, 0)])
+    (folder / "empty.csv").touch()
+    (folder / "bare.csv").write_text("0,0\n5,3\n")
+    (folder / "binary.csv").write_bytes(b"x,y\n\x80\xff\n")
+    before = snapshot(folder)
+    assert discreta(*arguments) == (2, "", f"discreta: {message}\n")
+    assert snapshot(folder) == before
+
+
+USAGE = {
+    "command": (["draw"], "'draw'", "discreta --help"),
+    "subcommand": (["simulate", "arch"], "'arch'", "discreta simulate --help"),
+    "option": ([*LINE, "--witdh", "8"], "'--witdh'", "discreta simulate line --help"),
+    "extra": ([*LINE, "5"], "(5)", "discreta simulate line --help"),
+    "no start": (["simulate", "line"], "'--start'", "discreta simulate line --help"),
+    "no file": (PATH_OF, "'FILE.csv'", "discreta simulate path --help"),
+    "no method": (["verilog"], "'METHOD'", "discreta verilog --help"),
+    "no value": ([*LINE, "--json"], "'--json'", "requires an argument"),
+    "preload": ([*LINE, "--preload", "full"], "'full'", "'zero', 'half'"),
+    "engine": ([*LINE, "--engine", "fast"], "'fast'", "'pysim', 'compiled'"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "value", "cure"), USAGE.values(), ids=USAGE)
+def test_bad_usage(discreta, folder, arguments, value, cure):
+    """One line that names what is wrong and ends with what helps; click has the words between."""
+    code, out, err = discreta(*arguments)
+    assert (code, out) == (2, "")
+    assert re.fullmatch(rf"discreta: [^\n]*{re.escape(value)}[^\n]*{re.escape(cure)}\n", err)
+    assert snapshot(folder) == {}
+
+
+@pytest.mark.parametrize("width", ["20", "32"])
+def test_a_survey_that_would_take_too_long(discreta, width, monkeypatch):
+    monkeypatch.setattr(cli, "default_engine", lambda: "compiled")
+    code, out, err = discreta("survey", "linear", "--width", width)
+    assert (code, out) == (2, "")
+    message = f"discreta: width {width} is too large to survey: one line takes up to "
+    assert err.startswith(f"{message}{2 ** int(width)} clocks; choose a width up to ")
+    assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("words", [[], ["simulate"]])
+def test_no_command_shows_what_there_is(discreta, words):
+    code, out, err = discreta(*words)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"Usage: {' '.join(['discreta', *words])} [OPTIONS] COMMAND")
+
+
+def paths(command=cli.cli, path=("discreta",)):
+    """Yield the words of every command there is."""
+    yield path
+    for name, inner in getattr(command, "commands", {}).items():
+        yield from paths(inner, (*path, name))
+
+
+@pytest.mark.parametrize("path", list(paths()), ids=" ".join)
+def test_every_help_has_an_example_that_parses(discreta, path):
+    code, out, err = discreta(*path[1:], "--help")
+    assert (code, err) == (0, "")
+    assert discreta(*path[1:], "-h") == (0, out, "")
+    assert "..." not in out.replace("[ARGS]...", "").replace("METHOD...", "")
+    (example,) = re.findall(r"^ +Example: (.*)$", out, flags=re.MULTILINE)
+    assert max(map(len, out.splitlines())) <= 80
+    words = shlex.split(example)
+    assert tuple(words[: len(path)]) == path
+    # It is taken as it stands, down to the command that is run.
+    context = click.Context(cli.cli, info_name=words.pop(0))
+    inner = cli.cli
+    while isinstance(inner, click.Group):
+        found = inner.get_command(context, words.pop(0))
+        assert found is not None
+        inner = found
+    assert inner.make_context("", words)
+
+
+# --- the machine it runs on
+
+
+def test_without_a_compiler_it_runs_on_pysim_and_says_so(discreta, monkeypatch):
+    monkeypatch.setenv("PATH", "/nowhere")
+    monkeypatch.delenv("CXX", raising=False)
+    code, out, err = discreta(*LINE)
+    assert (code, err) == (0, "no C++ compiler found: on pysim, a thousand times slower\n")
+    assert table(out)["engine"] == "pysim"
+    # Not when pysim is what was asked for.
+    assert discreta(*LINE, *PYSIM)[2] == discreta(*LINE, "--vcd", "w.vcd")[2] == ""
+    # And not before a complaint.
+    message = "discreta: cannot write no/t.csv: there is no folder no; make it first\n"
+    assert discreta(*LINE, "--trace", "no/t.csv") == (2, "", message)
+    message = "--engine compiled needs a C++ compiler: install one or use pysim"
+    assert discreta(*LINE, "--engine", "compiled") == (2, "", f"discreta: {message}\n")
+    message = "a survey needs the compiled engine: install a C++ compiler"
+    assert discreta("survey", "linear", "--width", "4") == (2, "", f"discreta: {message}\n")
+
+
+def test_a_compiler_that_is_none(discreta, monkeypatch, folder):
+    false = shutil.which("false")
+    assert false
+    monkeypatch.setenv("CXX", false)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    code, out, err = discreta(*LINE, "--trace", "t.csv")
+    assert (code, out) == (2, "")
+    assert err == f"discreta: {false} does not work as a C++ compiler: set CXX to one that does\n"
+    assert not (folder / "t.csv").exists()
+
+
+def test_without_the_solver_proofs_say_what_they_need(discreta, monkeypatch):
+    monkeypatch.setitem(sys.modules, "z3", None)
+    for name in ("discreta.sim.prover", "discreta.sim.smt"):
+        monkeypatch.delitem(sys.modules, name)
+    message = "proofs need z3: install the extra, pip install 'discreta[prove]'"
+    assert discreta("prove", "linear") == (2, "", f"discreta: {message}\n")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+@pytest.mark.parametrize("options", [["--trace"], ["--vcd", "w.vcd", "--trace"], ["--json"]])
+def test_a_full_disk(discreta, folder, options):
+    code, out, err = discreta(*LINE, *PYSIM, *options, "/dev/full")
+    assert (code, out) == (2, "")
+    assert err == "discreta: cannot write: No space left on device\n"
+    assert snapshot(folder) == {}
+
+
+def without_rights():
+    """Give the words before a command that take root's rights over files away from it."""
+    if os.geteuid() != 0:
+        return []
+    if shutil.which("setpriv") is None:
+        pytest.skip("root may write everywhere, and there is no setpriv")
+    return ["setpriv", "--bounding-set=-dac_override,-dac_read_search", "--inh-caps=-all"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            [*LINE, "--trace", "t.csv", "--json", "old.txt"],
+            "cannot write old.txt: the file is read-only; choose another name",
+        ),
+        (
+            [*LINE, "--trace", "t.csv", "--plot", "in/p.svg"],
+            "cannot write in/p.svg: Permission denied; choose another folder",
+        ),
+        (
+            [*PATH_OF, "secret.csv"],
+            "cannot read secret.csv: Permission denied; name a CSV file",
+        ),
+    ],
+    ids=["file", "folder", "input"],
+)
+def test_without_rights(folder, arguments, message):
+    (folder / "old.txt").write_text("old")
+    (folder / "old.txt").chmod(0o444)
+    write_csv("secret.csv", [(0, 0), (5, 3)])
+    (folder / "in").mkdir()
+    (folder / "in").chmod(0o555)
+    before = snapshot(folder)
+    (folder / "secret.csv").chmod(0)
+    words = [*without_rights(), sys.executable, "-m", "discreta", *arguments]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", f"discreta: {message}\n")
+    (folder / "secret.csv").chmod(0o600)
+    assert snapshot(folder) == before
+
+
+LONG = ["simulate", "line", "--start", "0,0", "--end", "1000000,999999", "--width", "32", *PYSIM]
+
+
+def start(*arguments):
+    words = [sys.executable, "-m", "discreta", *arguments]
+    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "said"),
+    [
+        (signal.SIGINT, 130, "discreta: interrupted, no file is written"),
+        (signal.SIGTERM, 143, ""),
+        (signal.SIGHUP, 129, ""),
+    ],
+)
+def test_an_interrupted_run_leaves_nothing(folder, number, code, said):
+    (folder / "t.csv").write_text("old")
+    process = start(*LONG, "--trace", "t.csv", "--vcd", "w.vcd", "--plot", "p.svg")
+    try:
+        deadline = time.monotonic() + 30
+        while sum(path.stat().st_size for path in folder.iterdir()) < 1000:
+            assert time.monotonic() < deadline, "it does not begin"
+            time.sleep(0.05)
+        assert (folder / "t.csv").read_text() == "old"
+        process.send_signal(number)
+        out, err = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert (process.returncode, out, err.strip()) == (code, "", said)
+    assert snapshot(folder) == {"t.csv": b"old"}
+
+
+@pytest.mark.parametrize("end", ["20,9", "3000,9"])
+def test_a_reader_that_has_seen_enough(folder, end):
+    """No traceback, and no half file; whether the pipe's buffer takes all of it or not."""
+    options = ["--start", "0,0", "--end", end, *PYSIM, "--trace", "-", "--json", "s.json"]
+    process = start("simulate", "line", *options)
+    try:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        said = process.stderr.read()
+        assert process.wait(timeout=30) == 128 + signal.SIGPIPE
+    finally:
+        process.kill()
+        if process.stderr is not None:
+            process.stderr.close()
+    # All was well when what is short comes to the pipe at the very end.
+    assert said == "" or (end == "20,9" and table(said)["end point reached"] == "yes")
+    assert list(snapshot(folder)) in ([], ["s.json"][: end == "20,9"])
+
+
+def test_an_old_terminal_has_no_root_signs(folder):
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(
+        [sys.executable, "-m", "discreta", "methods"],
+        capture_output=True,
+        env=environment,
+        timeout=60,
+        cwd=folder,
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"linear" in done.stdout
