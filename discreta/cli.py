@@ -97,14 +97,18 @@ def _options(*options: Callable) -> Callable:
     return decorate
 
 
-_width = click.option(
-    "--width",
-    type=_Number("width", MIN_WIDTH, MAX_WIDTH, check_width),
-    default=16,
-    show_default=True,
-    help="Bits of the device, 4 to 32: lines are up to 2^N - 1 steps long, coordinates lie between "
-    "-2^N and 2^N - 1.",
-)
+def _width_option(default: int) -> Callable:
+    return click.option(
+        "--width",
+        type=_Number("width", MIN_WIDTH, MAX_WIDTH, check_width),
+        default=default,
+        show_default=True,
+        help="Bits of the device, 4 to 32: lines are up to 2^N - 1 steps long, coordinates lie "
+        "between -2^N and 2^N - 1.",
+    )
+
+
+_width = _width_option(16)
 
 _axes = click.option(
     "--axes",
@@ -338,7 +342,7 @@ def prove(methods: tuple[Method, ...], width: int) -> None:
 
 @cli.command("survey", short_help="Run every line of a width and compare every register.")
 @click.argument("method", type=_MethodName())
-@_width
+@_width_option(8)
 def survey_command(method: Method, width: int) -> None:
     """Run every line of a width, or a seeded sample, and judge every register at every clock.
 
