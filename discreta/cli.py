@@ -164,8 +164,6 @@ class _Commands(click.Group):
             finally:
                 sys.stdout.flush()
         except BrokenPipeError:
-            # What is still in the buffer must not fail again at the end of Python.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise click.exceptions.Exit(128 + signal.SIGPIPE) from None
 
 
@@ -419,7 +417,13 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         # An old terminal has no letters such as √ and УУ: any sign will do there.
         cast(TextIOWrapper, stream).reconfigure(errors="replace")
-    sys.exit(_run())
+    code = _run()
+    try:
+        sys.stdout.flush()
+    except OSError:
+        # It has failed once, and must not fail again at the end of Python.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(code)
 
 
 def _end(number: int, _: Any) -> NoReturn:

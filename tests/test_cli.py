@@ -707,6 +707,19 @@ def test_a_full_disk(discreta, folder, options):
     assert snapshot(folder) == {}
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_full_disk_behind_the_standard_output(unbuffered):
+    words = [sys.executable, "-m", "discreta", *LINE, *PYSIM]
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            words, stdout=full, stderr=subprocess.PIPE, text=True, env=environment, timeout=60
+        )
+    assert done.returncode == 2
+    assert done.stderr == "discreta: cannot write: No space left on device\n"
+
+
 def without_rights():
     """Give the words before a command that take root's rights over files away from it."""
     if os.geteuid() != 0:
@@ -752,9 +765,11 @@ def test_without_rights(folder, arguments, message):
 LONG = ["simulate", "line", "--start", "0,0", "--end", "1000000,999999", "--width", "32", *PYSIM]
 
 
-def start(*arguments):
+def start(*arguments, **environment):
     words = [sys.executable, "-m", "discreta", *arguments]
-    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    pipe = subprocess.PIPE
+    variables = {**os.environ, **environment}
+    return subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True, env=variables)
 
 
 @pytest.mark.parametrize(
@@ -782,11 +797,12 @@ def test_an_interrupted_run_leaves_nothing(folder, number, code, said):
     assert snapshot(folder) == {"t.csv": b"old"}
 
 
+@pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("end", ["20,9", "3000,9"])
-def test_a_reader_that_has_seen_enough(folder, end):
+def test_a_reader_that_has_seen_enough(folder, end, unbuffered):
     """No traceback, and no half file; whether the pipe's buffer takes all of it or not."""
     options = ["--start", "0,0", "--end", end, *PYSIM, "--trace", "-", "--json", "s.json"]
-    process = start("simulate", "line", *options)
+    process = start("simulate", "line", *options, PYTHONUNBUFFERED=unbuffered)
     try:
         assert process.stdout is not None
         process.stdout.close()

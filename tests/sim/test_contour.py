@@ -87,6 +87,17 @@ def test_before_the_first_step_the_error_is_at_the_start():
     assert (contour.error_at, contour.largest_error, contour.ends_reached) == ((5, 6), 0, 0)
 
 
+def test_an_end_counts_with_the_last_step_alone():
+    """A device that comes by its end and goes on has missed it."""
+    starts, ends = np.array([[0, 0], [5, 5]]), np.array([[1, 0], [5, 7]])
+    by, on = [[(1, 0), (1, 1)], [(0, 1), (0, 1)]], [[(1, 1), (0, -1)], [(0, 1), (0, 1)]]
+    for steps, hit in ((by, 1), (on, 2)):
+        contour = LineContour(starts, ends)
+        events = events_of(steps, 2)
+        contour.follow(Stretch(len(events), 0, 0, events, np.empty((0, 0))))
+        assert contour.ends_reached == hit
+
+
 @settings(derandomize=True, database=None, max_examples=200, deadline=None)
 @given(st.data())
 def test_distances_of_the_longest_lines(data):
