@@ -87,6 +87,7 @@ def _library(top: PlainPorts) -> Path:
         subprocess.run(
             [found, *_FLAGS, f"-I{_RUNTIME}", "-o", str(built), str(source)],
             check=True,
+            capture_output=True,
         )
         built.replace(library)  # in one move, so that two builders never share half a file
     return library
@@ -173,7 +174,7 @@ class CompiledModel:
         blocks = np.ascontiguousarray(blocks, dtype=np.int64)
         assert blocks.shape[1:] == (len(self.block_fields),)
         events = np.empty((event_room, len(EVENT_COLUMNS) + len(self.step_fields)), dtype=np.int64)
-        watch = np.empty((clocks if self.watch else 0, len(self.watch)), dtype=np.int64)
+        watch = np.empty((clocks, len(self.watch)), dtype=np.int64)
         request = _Request(
             clocks=clocks,
             until_answered=until_answered,

@@ -1,5 +1,6 @@
 """Every method there is, found by its name: device, golden model, promises, and what to expect."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -25,7 +26,7 @@ class Method:
     summary : str
         What it draws and how, in a few words.
     error_bound : str
-        Largest distance from the true curve, in steps.
+        Largest distance from the true curve in the plane, in steps.
     clocks_per_step : str
     device, golden : callable
         Make the RTL and the golden model from the same parameters.
@@ -34,6 +35,8 @@ class Method:
     summations : callable
         ``summations(golden, lengths)``: the most summations that blocks take; ``lengths`` has shape
         (blocks, axes), in steps.
+    bound : callable
+        ``bound(golden)``: the error bound of one model, in steps.
     """
 
     name: str
@@ -44,6 +47,7 @@ class Method:
     golden: Callable[..., Any]
     choices: dict[str, tuple[Any, ...]]
     summations: Callable[[Any, np.ndarray], np.ndarray]
+    bound: Callable[[Any], float]
 
     def promises(self, golden: Any) -> list:
         """Give what is proven of the method beyond its equality to the golden model."""
@@ -66,6 +70,11 @@ def _linear_summations(golden: GoldenLinear, lengths: np.ndarray) -> np.ndarray:
     return np.array([1 << int(length).bit_length() for length in longest]) * (longest > 0)
 
 
+def _linear_bound(golden: GoldenLinear) -> float:
+    """Half a step, or less than one, on every axis but along the line: √a / 2 and √(a − 1)."""
+    return math.sqrt(golden.axes) / 2 if golden.preload == "half" else math.sqrt(golden.axes - 1)
+
+
 METHODS = {
     method.name: method
     for method in (
@@ -78,6 +87,7 @@ METHODS = {
             golden=GoldenLinear,
             choices={"normalize": (True, False), "preload": ("half", "zero")},
             summations=_linear_summations,
+            bound=_linear_bound,
         ),
     )
 }

@@ -85,7 +85,8 @@ def run_path(
 
     axes = points.shape[1]
     starts, ends = points[:-1], points[1:]
-    summations = method.summations(method.golden(width, axes, **choices), np.abs(ends - starts))
+    golden = method.golden(width, axes, **choices)
+    summations = method.summations(golden, np.abs(ends - starts))
     limit = int(summations.sum()) + _OVERHEAD * (len(starts) + 1)
     contour, pace, picture = LineContour(starts, ends), Pace(), PathPlot(points)
     with Outputs(reads) as outputs:
@@ -127,6 +128,7 @@ def run_path(
             "clocks per step": round(contour.clocks / contour.steps, 4) if contour.steps else None,
             "largest error": round(contour.largest_error, 4),
             "largest error at": list(contour.error_at),
+            "error bound": round(method.bound(golden), 4),
             "segments": len(starts),
             "support points hit": contour.ends_reached,
             "path closed": bool(np.array_equal(points[0], points[-1])),

@@ -1,6 +1,6 @@
 """Runs blocks through the RTL, on either engine, from reset to the last answer."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import IO
 
 import numpy as np
@@ -37,7 +37,6 @@ def simulate(
     stalls: Stalls = NO_STALLS,
     watch: tuple[str, ...] = (),
     vcd: IO[str] | None = None,
-    progress: Callable[[int], object] | None = None,
 ) -> Iterator[Stretch]:
     """Run blocks one behind the other and give what happened, stretch by stretch.
 
@@ -56,8 +55,6 @@ def simulate(
         Ports, or registers prefixed with ``reg_``, to record at every clock.
     vcd : file or None
         Where pysim writes a waveform.
-    progress : callable or None
-        Called with the number of blocks answered in every stretch.
 
     Raises
     ------
@@ -77,7 +74,7 @@ def simulate(
                     f"where {limit} must do"
                 )
             stretch = model.run(
-                blocks[fed:],
+                blocks[fed : fed + STRETCH],
                 min(STRETCH, limit - clocks),
                 until_answered=len(blocks) - answered,
                 stalls=stalls,
@@ -86,8 +83,6 @@ def simulate(
             clocks += stretch.ran
             fed += stretch.fed
             answered += stretch.answered
-            if progress:
-                progress(stretch.answered)
             yield stretch
     finally:
         model.close()

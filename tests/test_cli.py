@@ -680,8 +680,9 @@ def test_without_a_compiler_it_runs_on_pysim_and_says_so(discreta, monkeypatch):
 
 
 def test_a_compiler_that_is_none(discreta, monkeypatch, folder):
-    false = shutil.which("false")
-    assert false
+    false = str(folder / "false")
+    Path(false).write_text(f"#!{sys.executable}\nraise SystemExit(1)\n", encoding="utf-8")
+    Path(false).chmod(0o755)
     monkeypatch.setenv("CXX", false)
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
     code, out, err = discreta(*LINE, "--trace", "t.csv")
@@ -693,7 +694,7 @@ def test_a_compiler_that_is_none(discreta, monkeypatch, folder):
 def test_without_the_solver_proofs_say_what_they_need(discreta, monkeypatch):
     monkeypatch.setitem(sys.modules, "z3", None)
     for name in ("discreta.sim.prover", "discreta.sim.smt"):
-        monkeypatch.delitem(sys.modules, name)
+        monkeypatch.delitem(sys.modules, name, raising=False)
     message = "proofs need z3: install the extra, pip install 'discreta[prove]'"
     assert discreta("prove", "linear") == (2, "", f"discreta: {message}\n")
 

@@ -58,6 +58,7 @@ def test_one_call_runs_a_path(tmp_path):
         "clocks per step": round(expected[-1][0] / steps, 4),
         "largest error": round(largest, 4),
         "largest error at": summary["largest error at"],
+        "error bound": 1.0,
         "segments": 4,
         "support points hit": 4,
         "path closed": True,

@@ -151,14 +151,6 @@ def test_a_limit_is_kept_to_the_clock(engine, short):
         list(simulate(core, block, limit=needed - short, engine=engine))
 
 
-def test_progress_adds_up_to_the_blocks(engine, monkeypatch):
-    monkeypatch.setattr(simulation, "STRETCH", 100)
-    answered = []
-    list(simulate(Linear(WIDTH, 2), blocks(), limit=9000, engine=engine, progress=answered.append))
-    assert sum(answered) == len(blocks())
-    assert len(answered) > 3
-
-
 @pytest.mark.parametrize("model", [PysimModel, CompiledModel])
 def test_the_model_is_closed_whatever_happens(model, monkeypatch, request):
     if model is CompiledModel:

@@ -147,9 +147,12 @@ def test_the_lines_are_as_said(width, exhaustive):
     np.testing.assert_array_equal(survey_lines(width)[0], lines)
 
 
-@pytest.mark.parametrize("width", [20, 32])
+@pytest.mark.parametrize("width", [19, 20, 32])
 def test_a_width_that_takes_too_long_is_refused(width):
-    message = f"^width {width} is too large to survey: one line takes up to {2**width} clocks; "
+    message = (
+        f"^width {width} is too large to survey: one line takes up to {2**width} clocks; "
+        "choose a width up to 18$"
+    )
     with pytest.raises(ValueError, match=message):
         survey_lines(width)
     with pytest.raises(ValueError, match=message):
