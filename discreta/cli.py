@@ -227,7 +227,9 @@ def _simulate(points: np.ndarray, **options: Any) -> None:
 
         def progress(done: int, total: int) -> None:
             if slow and not done:
-                click.echo("no C++ compiler found: on pysim, a thousand times slower", err=True)
+                click.echo(
+                    "no C++ compiler found: running on pysim, which is much slower", err=True
+                )
             show(done, total)
 
         began = time.perf_counter()
