@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,6 @@ __all__ = [
     "Rtl",
     "Verdict",
     "check",
-    "check_all",
     "equivalence",
     "extend",
     "same",
@@ -115,15 +114,6 @@ def _values(model: z3.ModelRef) -> str:
         and isinstance(value := model[symbol], z3.BitVecNumRef | z3.IntNumRef | z3.RatNumRef)
     )
     return ", ".join(values) or "(no values)"
-
-
-def check_all(obligations: list[Obligation], seen: Callable[[Verdict], None]) -> bool:
-    """Prove one obligation after the other, report every verdict, and say whether all hold."""
-    verdicts = []
-    for obligation in obligations:
-        verdicts.append(check(obligation))
-        seen(verdicts[-1])
-    return all(verdict.holds for verdict in verdicts)
 
 
 def extend(value: z3.BitVecRef, signed: bool, width: int) -> z3.BitVecRef:
