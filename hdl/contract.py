@@ -16,6 +16,7 @@ from amaranth.lib import data, enum, wiring
 __all__ = [
     "AXIS_LETTERS",
     "MAX_AXES",
+    "MAX_GUARD",
     "MAX_WIDTH",
     "MIN_AXES",
     "MIN_WIDTH",
@@ -24,6 +25,8 @@ __all__ = [
     "RegisterNames",
     "check_axes",
     "check_choice",
+    "check_flag",
+    "check_guard",
     "check_width",
     "per_axis",
     "point_layout",
@@ -33,16 +36,21 @@ __all__ = [
 
 MIN_WIDTH, MAX_WIDTH = 4, 32
 MIN_AXES, MAX_AXES = 2, 6
+MAX_GUARD = 4
 AXIS_LETTERS = "xyzabc"
 
 
-class ErrorCode(enum.Enum, shape=1):  # pyright: ignore[reportGeneralTypeIssues, reportCallIssue]
+class ErrorCode(enum.Enum, shape=2):  # pyright: ignore[reportGeneralTypeIssues, reportCallIssue]
     """Why a block was not run. Put out for one clock, in place of ``done``."""
 
     #: Nothing is wrong.
     NONE = 0
-    #: The end is more than ``2^n − 1`` steps from the start along some axis.
+    #: It does not fit n bits: a line that is too long, an arc that is too large or leaves the
+    #: coordinates there are.
     RANGE = 1
+    #: The end is more than one step off the circle around the centre on which the start lies, or
+    #: the start is the centre.
+    OFF_CURVE = 2
 
 
 class Part(wiring.Component):
@@ -111,6 +119,17 @@ def check_width(width: int) -> None:
 def check_axes(axes: int) -> None:
     """Raise ``TypeError`` or ``ValueError`` unless ``axes`` is a whole number from 2 to 6."""
     _check_int("number of axes", axes, MIN_AXES, MAX_AXES)
+
+
+def check_guard(guard: int) -> None:
+    """Raise ``TypeError`` or ``ValueError`` unless ``guard`` is a whole number from 0 to 4."""
+    _check_int("number of guard bits", guard, 0, MAX_GUARD)
+
+
+def check_flag(what: str, value: bool) -> None:
+    """Raise ``TypeError`` unless ``value`` is True or False."""
+    if not isinstance(value, bool):
+        raise TypeError(f"{what} must be True or False, not {value!r}")
 
 
 def check_choice(what: str, value: str, choices: tuple[str, ...]) -> None:

@@ -10,6 +10,7 @@ from discreta.hdl.contract import (
     Part,
     check_axes,
     check_choice,
+    check_flag,
     check_width,
     point_layout,
     register_names,
@@ -97,8 +98,7 @@ class Linear(Part):
         check_width(width)
         check_axes(axes)
         check_choice("preload", preload, PRELOADS)
-        if not isinstance(normalize, bool):
-            raise TypeError(f"normalize must be True or False, not {normalize!r}")
+        check_flag("normalize", normalize)
         point = point_layout(width, axes)
         super().__init__(
             {
@@ -207,6 +207,7 @@ class Linear(Part):
                 p_increment.initial.eq(scaled[a]),
                 p_position.initial.eq(inp.start[a]),
                 p_remaining.initial.eq(inp.delta[a]),
+                s.initial.eq(s.preloaded),
                 s.addend.eq(p_increment.register),
                 s.enable.eq(uu.clock & ~p_remaining.zero),
                 p_remaining.count.eq(s.carry),

@@ -4,6 +4,7 @@ from discreta.hdl.parts.control_unit import ControlUnit
 from discreta.hdl.parts.increment_register import IncrementRegister
 from discreta.hdl.parts.normalizer import Normalizer
 from discreta.hdl.parts.position_register import PositionRegister
+from discreta.hdl.parts.radius_meter import RadiusMeter
 from discreta.hdl.parts.remaining_counter import RemainingCounter
 from discreta.hdl.parts.summator import PRELOADS, Summator
 
@@ -13,6 +14,7 @@ __all__ = [
     "IncrementRegister",
     "Normalizer",
     "PositionRegister",
+    "RadiusMeter",
     "RemainingCounter",
     "Summator",
 ]

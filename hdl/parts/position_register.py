@@ -1,7 +1,7 @@
-"""The position register (P3, P4)."""
+"""The position register (P3, P4 of the linear, P1, P2 of the circular interpolator)."""
 
 from amaranth import Module, Signal
-from amaranth.hdl import signed
+from amaranth.hdl import signed, unsigned
 from amaranth.lib.wiring import In
 
 from discreta.hdl.contract import Part, check_width
@@ -15,14 +15,16 @@ class PositionRegister(Part):
     Latency: ``register`` follows ``load``, ``up`` or ``down`` at the clock's edge. ``load`` goes
     before counting; ``up`` and ``down`` together leave the value as it is. Throughput: a step a
     clock.
-    Reset: 0. Overflow: wraps; a block whose start and end are in range never makes it wrap, since
-    every point between lies between them. Error: none.
-    Source: lecture, block diagram of the linear interpolator (P3 = XT, P4 = YT).
+    Reset: 0. Overflow: wraps; no block that is run makes it wrap. Error: none.
+    Source: lecture, block diagrams of the linear interpolator (P3 = XT, P4 = YT) and of the
+    circular one (P1 = XT, P2 = YT, seen from the centre in the first quadrant).
 
     Parameters
     ----------
     width : int
-        n, 4 to 32; the value is signed, n + 1 bits, in steps.
+        n, 4 to 32.
+    magnitude : bool
+        The value is in steps; it is signed, n + 1 bits, or as a magnitude unsigned, n bits.
     name : str
         Name of the register in waveforms.
 
@@ -32,9 +34,9 @@ class PositionRegister(Part):
         ``width`` is not a whole number from 4 to 32.
     """
 
-    def __init__(self, width: int, *, name: str = "position"):
+    def __init__(self, width: int, *, magnitude: bool = False, name: str = "position"):
         check_width(width)
-        shape = signed(width + 1)
+        shape = unsigned(width) if magnitude else signed(width + 1)
         super().__init__({"load": In(1), "initial": In(shape), "up": In(1), "down": In(1)})
         self.register = Signal(shape, name=name)
 

@@ -75,7 +75,8 @@ class Linear:
                 f"delta_{a}": (n, False),
                 f"negative_{a}": (1, False),
             }
-        return kinds | dict.fromkeys(("pending", "fault", "running", "done", "error"), (1, False))
+        kinds |= dict.fromkeys(("pending", "running", "done"), (1, False))
+        return kinds | dict.fromkeys(("fault", "error"), (2, False))
 
     def reset(self) -> State:
         """Give the state after reset."""
@@ -112,9 +113,10 @@ class Linear:
         for a in self.letters:
             empty = empty & equal(state[f"delta_{a}"], 0)
         # A block with nothing to sum lets the step before it go first: one answer a clock.
-        next_may = where(empty | state["fault"], negate(waiting), free)
+        sound = equal(state["fault"], 0)
+        next_may = where(empty | negate(sound), negate(waiting), free)
         start = state["pending"] & negate(state["running"]) & next_may
-        load = start & negate(state["fault"])
+        load = start & sound
         clock = state["running"] & free
         accept = inputs["blocks_valid"] & self.outputs(state)["blocks_ready"]
 
@@ -159,7 +161,7 @@ class Linear:
         finished = clock & equal(steps_left, 0)
         after["running"] = where(load, negate(empty), where(finished, 0, state["running"]))
         after["done"] = (taken & negate(state["running"])) | (load & empty)
-        after["error"] = start & state["fault"]
+        after["error"] = where(start, state["fault"], 0)
         after["pending"] = where(accept, 1, where(start, 0, state["pending"]))
         after["fault"] = where(accept, fault, state["fault"])
         return after
