@@ -5,6 +5,7 @@ schemdraw gives the same bytes on every machine: text stays text, and no font is
 """
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,59 +17,38 @@ from schemdraw.elements import Element
 from schemdraw.logic import TimingDiagram
 from schemdraw.segments import Segment, SegmentCircle, SegmentPoly, SegmentText
 
+from discreta.hdl.circular import Circular
+from discreta.hdl.contract import Part
 from discreta.hdl.linear import Linear
 from discreta.sim.interpreted import CLOCK_PERIOD
 
 __all__ = [
-    "CLOCKS",
-    "END",
     "FIGURES",
-    "HELD_CLOCK",
-    "LANES",
-    "NUMBERS",
-    "WIDTH",
-    "carry_run",
-    "carry_wave",
+    "TIMINGS",
+    "Lane",
+    "Sheet",
+    "Timing",
+    "circular_blocks",
+    "circular_turn",
     "draw",
+    "linear_blocks",
+    "linear_carry",
     "main",
 ]
 
 FONT = "Arial, Helvetica, Liberation Sans, DejaVu Sans, sans-serif"
 INK, CONTROL, QUIET, PAPER = "#1b1f24", "#1a56b0", "#57606a", "#ffffff"
-REGISTER_FILL, LOGIC_FILL, CONTROL_FILL, HELD_FILL = "#e3eefc", "#f3f3ef", "#fff1cc", "#fff1cc"
+REGISTER_FILL, LOGIC_FILL, CONTROL_FILL, SHADE = "#e3eefc", "#f3f3ef", "#fff1cc", "#fff1cc"
+#: What a picture is about.
+EYE = "#c2410c"
 NAME_SIZE, TEXT_SIZE = 12, 10
-
-#: The block of the timing diagram, (0, 0) to END on n = WIDTH bits, and the clocks shown of it.
-WIDTH, END, CLOCKS = 8, (200, 99), 10
-#: The clock in which the step of the first carry waits: it is refused for this one clock.
-HELD_CLOCK = 4
-
-#: The lanes of the timing diagram, what they mean, and which of them are numbers.
-LANES = {
-    "blocks.valid": "a block is offered",
-    "blocks.ready": "and accepted",
-    "УУ start": "loads the registers",
-    "УУ clock": "a summation in this clock",
-    "P1 = ΔX": "increment",
-    "SX": f"sum modulo {1 << WIDTH}",
-    "SX carry": f"the summation reaches {1 << WIDTH}",
-    "P5 = KOX": "steps left along x",
-    "steps.valid": "a step waits",
-    "steps.ready": "and is taken",
-    "P3 = XT": "coordinate",
-    "done = край": "end of the block",
-}
-NUMBERS = ("P1 = ΔX", "SX", "P5 = KOX", "P3 = XT")
-
-INPUT_WORDS = "processing\n\n|end − start|\nand the signs;\none block\nahead"
-NORMALIZER_WORDS = "(optional)\n\n× 2ˢ,\nthe same s\nfor both"
-OUTPUT_WORDS = "processing\n\nputs in the\nsigns; holds\na step until\nit is taken"
-CONTROL_WORDS = (
-    "control unit\n\nstart (старт) takes the prepared block, load puts it into the registers"
-)
+LINE = 1.2
 
 XY = tuple[float, float]
 Align = Literal["left", "center", "right"]
+Run = dict[str, list[int]]
+#: A place in a timing diagram: a lane and a moment of it, in clocks.
+Spot = tuple[str, float]
 
 
 class Sheet(Element):
@@ -98,53 +78,150 @@ class Sheet(Element):
             SegmentText(at, words, align=(align, "center"), color=color, fontsize=size)
         )
 
-    def box(self, *area: float, fill: str, name: str, words: str = "") -> None:
-        """Draw a box with a name and smaller lines of ``words`` under it, all in the middle."""
+    def box(
+        self, *area: float, fill: str, name: str, words: str = "", middle: float | None = None
+    ) -> None:
+        """Draw a box with a name and smaller lines of ``words`` under it, around its ``middle``."""
         left, bottom, right, top = area
         self._rectangle(area, INK, fill, zorder=1)
         lines = words.splitlines()
-        x, y = (left + right) / 2, (bottom + top) / 2 + 0.19 * len(lines)
+        x = (left + right) / 2 if middle is None else middle
+        y = (bottom + top) / 2 + 0.19 * len(lines)
         self.words((x, y), name, "center", size=NAME_SIZE)
         for number, line in enumerate(lines, 1):
             self.words((x, y - 0.38 * number), line, "center")
 
-    def wire(self, *path: XY, color: str = INK) -> None:
-        """Draw an arrow along ``path``, whose lines go up and down or sideways."""
+    def wire(self, *path: XY, color: str = INK, weight: float = LINE) -> None:
+        """Draw an arrow along ``path``, whose last line goes up, down or sideways."""
         (x0, y0), (x, y) = path[-2:]
         dx, dy = (x > x0) - (x < x0), (y > y0) - (y < y0)
         # The library's own heads stop short of the point they show.
-        base = (x - 0.2 * dx, y - 0.2 * dy)
-        head = [(base[0] + half * dy, base[1] + half * dx) for half in (0.08, -0.08)]
+        scale = (weight / LINE) ** 0.5
+        base = (x - 0.2 * scale * dx, y - 0.2 * scale * dy)
+        head = [
+            (base[0] + half * dy, base[1] + half * dx) for half in (0.08 * scale, -0.08 * scale)
+        ]
         self.segments += [
-            Segment([*path[:-1], base], color=color, lw=1.2, joinstyle="miter", zorder=2),
+            Segment([*path[:-1], base], color=color, lw=weight, joinstyle="miter", zorder=2),
             SegmentPoly([(x, y), *head], color=color, fill=color, lw=0.1, zorder=2),
         ]
+
+    def gap(self, *path: XY, weight: float) -> None:
+        """Leave the paper free along ``path``, so that the wire that follows crosses over."""
+        self.segments.append(Segment(list(path), color=PAPER, lw=weight, zorder=2))
 
     def dot(self, at: XY, color: str = INK) -> None:
         """Show that the wires that meet here are joined."""
         self.segments.append(SegmentCircle(at, 0.07, color=color, fill=color, lw=0.1, zorder=2))
 
-    def signal(self, *path: XY, words: str = "", at: XY = (0, 0)) -> None:
+    def signal(self, *path: XY, words: str = "", at: XY = (0, 0), align: Align = "left") -> None:
         """Draw a wire of the control unit, with its name."""
         self.wire(*path, color=CONTROL)
-        self.words(at, words, color=CONTROL)
+        self.words(at, words, align, color=CONTROL)
+
+    def block(self, edge: float, top: float, *fields: str) -> None:
+        """Draw the stream of blocks with its ``fields``, from ``top`` down, into the input."""
+        self.words((0.1, top + 0.7), "blocks", color=QUIET)
+        for row, what in enumerate((*fields, "valid", "ready")):
+            y = top - 0.7 * row
+            ends = (0.1, y), (edge, y)
+            self.wire(*(reversed(ends) if what == "ready" else ends))
+            self.words((0.1, y + 0.22), what)
+
+    def summator(
+        self, axis: str, counter: str, left: float, y: float, outer: float, edge: float
+    ) -> None:
+        """Draw the summator of an axis, its counter ``outer`` of it, its carry to the output."""
+        side = 1 if outer > y else -1
+        self.box(
+            *(left, y - 0.6, left + 1.5, y + 0.6),
+            fill=REGISTER_FILL,
+            name=f"S{axis}",
+            words="summator",
+        )
+        self.box(
+            *(left + 2.0, outer - 0.6, left + 3.3, outer + 0.6),
+            fill=REGISTER_FILL,
+            name=counter,
+            words=f"KO{axis}",
+        )
+        # The carry is a step, and one less to go; none to go stops the summator.
+        self.wire((left + 1.5, y), (edge, y))
+        self.words((left + 1.6, y - 0.25 * side), "carry")
+        self.dot((left + 2.65, y))
+        self.wire((left + 2.65, y), (left + 2.65, outer - 0.6 * side))
+        self.words((left + 2.75, outer - 0.95 * side), "−1")
+        zero, x = outer - 0.3 * side, left + 1.15
+        self.wire((left + 2.0, zero), (x, zero), (x, y + 0.6 * side))
+        self.words((x - 0.1, zero), "0: stop", "right")
+
+    def position(self, start: XY, edge: float, boxes: Iterable[tuple[str, str]], y: float) -> None:
+        """Draw the coordinates, x at ``y``, counted by the output and loaded from ``start``."""
+        corner = edge + 0.5
+        self.wire(start, (corner, start[1]), (corner, y - 1.9), (edge + 1.2, y - 1.9))
+        self.words((start[0] + 0.1, start[1] + 0.22), "XH, YH")
+        self.dot((corner, y + 0.3))
+        self.wire((corner, y + 0.3), (edge + 1.2, y + 0.3))
+        self.words((edge + 2.7, y + 0.4), "position", color=QUIET)
+        for row, ((name, words), coordinate) in enumerate(zip(boxes, ("XT", "YT"), strict=True)):
+            at = y - 2.2 * row
+            area = (edge + 1.2, at - 0.6, edge + 2.5, at + 0.6)
+            self.box(*area, fill=REGISTER_FILL, name=name, words=words)
+            self.wire((edge, at - 0.3), (edge + 1.2, at - 0.3))
+            self.words((edge + 0.58, at - 0.53), "±1")
+            self.wire((edge + 2.5, at), (edge + 3.1, at))
+            self.words((edge + 3.2, at), coordinate)
+            top = (edge + 1.85, at + 0.6)
+            self.load(top, 1)
+
+    def load(self, at: XY, side: int, words: str = "load", align: Align = "left") -> None:
+        """Draw a signal that comes to a register from above (``side`` 1) or below (−1)."""
+        x, y = at
+        label = (x + (0.1 if align == "left" else -0.1), y + 0.35 * side)
+        self.signal((x, y + 0.5 * side), at, words=words, at=label, align=align)
+
+    def answers(self, edge: float, top: float) -> None:
+        """Draw what the control unit has to do with the world, from ``top`` down."""
+        self.signal((edge + 1.1, top), (edge, top), words="steps: ready", at=(edge + 1.2, top))
+        for row, words in enumerate(("steps: last", "busy", "done (край)", "error"), 1):
+            y = top - 0.45 * row
+            self.signal((edge, y), (edge + 1.1, y), words=words, at=(edge + 1.2, y))
 
 
-def draw_blocks() -> Iterable[Element]:
+def linear_blocks() -> Iterable[Element]:
     """Draw the block diagram of the linear interpolator, after the lecture's."""
     s = Sheet(-0.1, -2.5, 20.5, 10.5)
-    s.box(2.4, 1.3, 4.6, 10.1, fill=LOGIC_FILL, name="Input", words=INPUT_WORDS)
-    s.box(5.45, 3.0, 7.45, 6.8, fill=LOGIC_FILL, name="Normalizer", words=NORMALIZER_WORDS)
-    s.box(14.4, 1.3, 16.5, 8.5, fill=LOGIC_FILL, name="Output", words=OUTPUT_WORDS)
-    s.box(2.4, -2.2, 16.5, 0.2, fill=CONTROL_FILL, name="УУ", words=CONTROL_WORDS)
+    s.box(
+        *(2.4, 1.3, 4.6, 10.1),
+        fill=LOGIC_FILL,
+        name="Input",
+        words="processing\n\n|end − start|\nand the signs;\none block\nahead",
+    )
+    s.box(
+        *(5.45, 3.0, 7.45, 6.8),
+        fill=LOGIC_FILL,
+        name="Normalizer",
+        words="(optional)\n\n× 2ˢ,\nthe same s\nfor both",
+    )
+    s.box(
+        *(14.4, 1.3, 16.5, 8.5),
+        fill=LOGIC_FILL,
+        name="Output",
+        words="processing\n\nputs in the\nsigns; holds\na step until\nit is taken",
+    )
+    s.box(
+        *(2.4, -2.2, 16.5, 0.2),
+        fill=CONTROL_FILL,
+        name="УУ",
+        words="control unit\n\n"
+        "start (старт) takes the prepared block, load puts it into the registers",
+    )
 
     # The axes mirror each other.
     for axis, number, y, outer, side in (("X", 1, 6.0, 7.9, 1), ("Y", 2, 3.8, 1.9, -1)):
-        p1, p5 = f"P{number}", f"P{number + 4}"
+        p1 = f"P{number}"
         s.box(8.0, y - 0.6, 9.2, y + 0.6, fill=REGISTER_FILL, name=p1, words=f"Δ{axis} · 2ˢ")
-        s.box(10.1, y - 0.6, 11.6, y + 0.6, fill=REGISTER_FILL, name=f"S{axis}", words="summator")
-        box = (12.1, outer - 0.6, 13.4, outer + 0.6)
-        s.box(*box, fill=REGISTER_FILL, name=p5, words=f"KO{axis}")
+        s.summator(axis, f"P{number + 4}", 10.1, y, outer, 14.4)
         # The increment: through the normalizer to the summator, and past it to the counter.
         s.wire((4.6, y), (5.45, y))
         s.words((4.7, y - 0.25 * side), f"Δ{axis}")
@@ -152,45 +229,21 @@ def draw_blocks() -> Iterable[Element]:
         s.wire((5.05, y), (5.05, outer + 0.3 * side), (12.1, outer + 0.3 * side))
         s.wire((7.45, y), (8.0, y))
         s.wire((9.2, y + 0.25 * side), (10.1, y + 0.25 * side))
-        # The carry is a step, and one less to go; none to go stops the summator.
-        s.wire((11.6, y), (14.4, y))
-        s.words((11.7, y - 0.25 * side), "carry")
-        s.dot((12.75, y))
-        s.wire((12.75, y), (12.75, outer - 0.6 * side))
-        s.words((12.85, y + 0.95 * side), "−1")
-        zero = outer - 0.3 * side
-        s.wire((12.1, zero), (11.25, zero), (11.25, y + 0.6 * side))
-        s.words((11.15, zero), "0: stop", "right")
 
     # In and out: the block, the steps, the coordinates.
-    s.words((0.1, 7.5), "blocks", color=QUIET)
-    for y, what in ((6.8, "start XH, YH"), (6.1, "end XK, YK"), (5.4, "valid")):
-        s.wire((0.1, y), (2.4, y))
-        s.words((0.1, y + 0.22), what)
-    s.wire((2.4, 4.7), (0.1, 4.7))
-    s.words((0.1, 4.92), "ready")
+    s.block(2.4, 6.8, "start XH, YH", "end XK, YK")
     s.wire((4.6, 9.3), (15.9, 9.3), (15.9, 8.5))
     s.words((4.7, 9.08), "signs")
-    s.wire((4.6, 9.8), (17.0, 9.8), (17.0, 5.5), (17.7, 5.5))
-    s.words((4.7, 10.02), "XH, YH")
-    s.dot((17.0, 7.7))
-    s.wire((17.0, 7.7), (17.7, 7.7))
-    for name, coordinate, y in (("P3", "XT", 7.4), ("P4", "YT", 5.2)):
-        s.box(17.7, y - 0.6, 19.0, y + 0.6, fill=REGISTER_FILL, name=name, words=coordinate)
-        s.wire((16.5, y - 0.3), (17.7, y - 0.3))
-        s.words((17.08, y - 0.53), "±1")
-        s.wire((19.0, y), (19.6, y))
-        s.words((19.7, y), coordinate)
-    s.words((19.2, 7.8), "position", color=QUIET)
+    s.position((4.6, 9.8), 16.5, (("P3", "XT"), ("P4", "YT")), 7.4)
     s.wire((16.5, 3.4), (17.6, 3.4))
     s.words((17.7, 3.4), "steps: x, y, valid")
 
     # The control unit.
     for x, y, side in (
         *((8.6, 6.6, 1), (10.4, 6.6, 1), (12.75, 8.5, 1), (15.0, 8.5, 1)),
-        *((8.6, 3.2, -1), (10.4, 3.2, -1), (12.3, 1.3, -1), (18.35, 8.0, 1), (18.35, 5.8, 1)),
+        *((8.6, 3.2, -1), (10.4, 3.2, -1), (12.3, 1.3, -1)),
     ):
-        s.signal((x, y + 0.5 * side), (x, y), words="load", at=(x + 0.1, y + 0.35 * side))
+        s.load((x, y), side)
     s.signal((2.8, 0.2), (2.8, 1.3), words="start, idle", at=(2.9, 0.75))
     s.signal((4.4, 1.3), (4.4, 0.2), words="pending, fault, empty", at=(4.5, 0.75))
     s.signal((9.65, 0.2), (9.65, 5.75), (10.1, 5.75), words="clock", at=(9.75, 0.75))
@@ -200,105 +253,364 @@ def draw_blocks() -> Iterable[Element]:
     s.signal((13.4, 7.9), (13.9, 7.9), (13.9, 0.2), words="ending", at=(14.0, 0.75))
     s.signal((15.1, 1.3), (15.1, 0.2), words="waiting", at=(15.2, 0.75))
     s.signal((16.3, 0.2), (16.3, 1.3), words="clock, taken", at=(16.4, 0.75))
-    s.signal((17.6, -0.1), (16.5, -0.1), words="steps: ready", at=(17.7, -0.1))
-    for row, words in enumerate(("steps: last", "busy", "done (край)", "error"), 1):
-        y = -0.1 - 0.45 * row
-        s.signal((16.5, y), (17.6, y), words=words, at=(17.7, y))
+    s.answers(16.5, -0.1)
     return [s]
 
 
-def carry_run() -> dict[str, list[int]]:
-    """Run the block of the timing diagram; give the values of every lane, clock by clock."""
-    core = Linear(WIDTH, 2, normalize=False, preload="zero")
-    signals = {
-        "blocks.valid": core.blocks.valid,
-        "blocks.ready": core.blocks.ready,
-        "УУ start": core.uu.start,
-        "УУ clock": core.uu.clock,
-        "P1 = ΔX": core.registers["p1"],
-        "SX": core.registers["sx"],
-        "SX carry": core.summator["x"].carry,
-        "P5 = KOX": core.registers["p5"],
-        "steps.valid": core.steps.valid,
-        "steps.ready": core.steps.ready,
-        "P3 = XT": core.registers["p3"],
-        "done = край": core.done,
-    }
-    run: dict[str, list[int]] = {name: [] for name in LANES}
-
-    async def bench(ctx):
-        end = dict(zip("xy", END, strict=True))
-        ctx.set(core.blocks.payload, {"start": {"x": 0, "y": 0}, "end": end})
-        for clock in range(CLOCKS):
-            ctx.set(core.blocks.valid, clock == 0)
-            ctx.set(core.steps.ready, clock != HELD_CLOCK)
-            for name, values in run.items():
-                values.append(int(ctx.get(signals[name])))
-            await ctx.tick()
-
-    simulator = Simulator(core)
-    simulator.add_clock(CLOCK_PERIOD)
-    simulator.add_testbench(bench)
-    simulator.run()
-    return run
-
-
-def carry_wave(run: dict[str, list[int]]) -> dict[str, Any]:
-    """Turn a run into WaveJSON, with arrows from the first carry to its step and its taking."""
-    signal: list[dict[str, Any]] = [{"name": "clock", "wave": "p" + "." * (CLOCKS - 1)}]
-    for name, values in run.items():
-        new = [clock == 0 or values[clock] != values[clock - 1] for clock in range(CLOCKS)]
-        # A wave has a letter a clock: a level, 5 for a number in a blue box, a point for no change.
-        letters = ("5" if name in NUMBERS else str(value) for value in values)
-        lane: dict[str, Any] = {
-            "name": name,
-            "wave": "".join(letter if n else "." for letter, n in zip(letters, new, strict=True)),
-        }
-        if name in NUMBERS:
-            lane["data"] = [str(value) for value, n in zip(values, new, strict=True) if n]
-        signal.append(lane)
-    carry = run["SX carry"].index(1)
-    taken = [a and b for a, b in zip(run["steps.valid"], run["steps.ready"], strict=True)].index(1)
-    for name, clock, node in (
-        ("SX carry", carry, "A"),
-        ("steps.valid", carry + 1, "B"),
-        ("steps.ready", taken, "C"),
-        ("P3 = XT", taken + 1, "D"),
-    ):
-        lane = next(lane for lane in signal if lane["name"] == name)
-        lane["node"] = "." * clock + node
-    return {
-        "signal": signal,
-        "edge": ["A~>B", "C~>D"],
-        "head": {"tock": 0},
-        "shade": [f"{HELD_CLOCK} * {HELD_FILL}"],
-    }
-
-
-def draw_carry() -> Iterable[Element]:
-    """Draw a carry of SX, and its step that has to wait for a clock."""
-    diagram = TimingDiagram(
-        carry_wave(carry_run()),
-        namecolor=INK,
-        tickcolor=INK,
-        edgecolor=CONTROL,
-        gridcolor="#c9ced4",
-        fontsize=TEXT_SIZE,
-        datafontsize=TEXT_SIZE,
+def circular_blocks() -> Iterable[Element]:
+    """Draw the block diagram of the circular interpolator, after the lecture's."""
+    s = Sheet(-0.1, -4.6, 22.0, 11.2)
+    s.box(
+        *(3.0, 0.1, 5.2, 10.7),
+        fill=LOGIC_FILL,
+        name="Input",
+        words="processing\n\nseen from the\ncentre: mirrors\na clockwise arc,\n"
+        "turns its start\nto quadrant I;\none block\nahead",
     )
-    s = Sheet(-2.6, -10.9, 14.6, 1.4)
-    for row, meaning in enumerate(LANES.values(), 1):
-        s.words((CLOCKS + 0.2, 0.18 - 0.8 * row), meaning, color=QUIET)
-    s.words((HELD_CLOCK + 0.5, -10.05), "held", "center")
-    block = f"block (0, 0) → {END}, n = {WIDTH}, no normalizer, preload 0"
-    s.words((CLOCKS / 2, -10.55), block, "center", QUIET)
-    return [s, diagram]
+    s.box(
+        *(0.0, 0.1, 2.5, 4.3),
+        fill=LOGIC_FILL,
+        name="Radius meter",
+        words="\nS = XH² + YH²,\n⌊2√S⌋\n\nend off by more\nthan a step?\n\n"
+        "bit by bit,\n2n + 4 clocks",
+    )
+    s.wire((3.0, 3.2), (2.5, 3.2))
+    s.wire((2.5, 1.2), (3.0, 1.2))
+    s.box(
+        *(7.9, 2.2, 9.8, 7.2),
+        fill=LOGIC_FILL,
+        name="Normalizer",
+        words="(optional)\n\n× 2ˢ,\nthe same s\nfor both,\nevery clock",
+    )
+    s.box(
+        *(16.2, 0.1, 18.3, 9.3),
+        fill=LOGIC_FILL,
+        name="Output",
+        words="processing\n\nturns back,\nputs in the\nsigns; holds\na step until\nit is taken",
+    )
 
+    # The axes mirror each other, but for where the carry leads.
+    rows = (("X", 1, 6.4, 8.7, 1, "−1"), ("Y", 2, 3.0, 0.7, -1, "+1"))
+    for axis, number, y, outer, side, count in rows:
+        area = (6.0, y - 0.6, 7.3, y + 0.6)
+        s.box(*area, fill=REGISTER_FILL, name=f"P{number}", words=f"{axis} now")
+        s.summator(axis, f"P{number + 2}", 12.0, y, outer, 16.2)
+        s.wire((5.2, y), (6.0, y))
+        s.words((5.3, y - 0.25 * side), axis)
+        s.wire((5.2, outer + 0.3 * side), (14.0, outer + 0.3 * side))
+        s.words((5.3, outer + 0.52 * side), f"steps of {axis} left")
+        back = y + 1.15 * side
+        s.dot((14.65, back))
+        s.wire((14.65, back), (6.65, back), (6.65, y + 0.6 * side))
+        s.words((6.75, y + 0.88 * side), count)
+        s.load((6.3, y - 0.6 * side), -side, "load, turn")
+        s.load((12.3, y - 0.6 * side), -side, "clock, load, turn")
+
+    # Each coordinate moves the other.
+    s.wire((7.3, 6.4), (7.9, 6.4), color=EYE, weight=3)
+    s.wire((7.3, 3.0), (7.9, 3.0), color=EYE, weight=3)
+    falling = ((9.8, 6.4), (10.1, 6.4), (11.4, 3.0), (12.0, 3.0))
+    rising = ((9.8, 3.0), (10.1, 3.0), (11.4, 6.4), (12.0, 6.4))
+    s.wire(*falling, color=EYE, weight=3)
+    s.gap((10.6, 4.31), (10.9, 5.09), weight=8)
+    s.wire(*rising, color=EYE, weight=3)
+    s.words((11.95, 6.75), "Y · 2ˢ", "right", EYE)
+    s.words((11.95, 2.65), "X · 2ˢ", "right", EYE)
+    s.words((13.45, 4.92), "x′ = −k·y,  y′ = k·x", "center", EYE, NAME_SIZE)
+    s.words((13.45, 4.48), "alternated: SY adds the new X", "center", QUIET)
+
+    # In and out: the block, the steps, the coordinates.
+    fields = "start XH, YH", "end XK, YK", "center", "clockwise", "full_turns"
+    s.block(3.0, 9.7, *fields)
+    s.wire((5.2, 9.9), (17.9, 9.9), (17.9, 9.3))
+    s.words((5.3, 9.68), "directions")
+    s.position((5.2, 10.4), 18.3, (("XT", ""), ("YT", "")), 7.2)
+    s.wire((18.3, 2.6), (19.4, 2.6))
+    s.words((19.5, 2.6), "steps: x, y, valid")
+
+    # The control unit, and what it does at an axis.
+    s.box(
+        *(3.0, -4.3, 18.3, -0.9),
+        fill=CONTROL_FILL,
+        name="УУ",
+        words="control unit\n\nstart (старт) takes the\nprepared block, load puts\n"
+        "it into the registers",
+        middle=5.3,
+    )
+    s.box(7.7, -2.5, 10.3, -1.2, fill=REGISTER_FILL, name="turns", words="axis crossings\nto come")
+    s.box(7.7, -4.0, 10.3, -2.7, fill=REGISTER_FILL, name="swap", words="X is the\nmachine’s y")
+    s.box(10.6, -4.1, 18.0, -1.1, fill=PAPER, name="")
+    s.words((14.3, -1.38), "turn", "center", size=NAME_SIZE)
+    s.words((14.3, -1.76), "of the frame by 90°, when P3 = 0 and turns > 0", "center")
+    for row, pair in enumerate(
+        (
+            ("P1 ← P2", "SX ← ~SY"),
+            ("P2 ← 0", "SY ← SX"),
+            ("turns ← turns − 1", "swap ← ~swap"),
+            ("P3 ← P2, at last |P2 − XK|", "P4 ← ⌊R⌋ + 1, at last YK"),
+        )
+    ):
+        for x, words in zip((10.85, 14.7), pair, strict=True):
+            s.words((x, -2.35 - 0.45 * row), words)
+    s.load((14.3, 9.3), 1, "load, turn")
+    s.load((14.2, 0.1), -1, "load, turn", "right")
+    s.load((16.5, 9.3), 1, "load, turn")
+    s.signal((3.3, -0.9), (3.3, 0.1), words="start", at=(3.4, -0.4))
+    s.signal(
+        (4.4, 0.1),
+        (4.4, -0.9),
+        words="pending, fault, empty;  turns, swap, XK, YK, ⌊R⌋ + 1",
+        at=(4.5, -0.4),
+    )
+    s.signal((15.0, 0.1), (15.0, -0.9))
+    s.signal(
+        (15.3, 8.7),
+        (15.75, 8.7),
+        (15.75, -0.9),
+        words="0, ending",
+        at=(14.85, -0.68),
+        align="right",
+    )
+    s.signal((16.5, 0.1), (16.5, -0.9), words="waiting", at=(16.6, -0.4))
+    s.signal((18.0, -0.9), (18.0, 0.1), words="clock, taken, swap", at=(18.1, -0.4))
+    s.answers(18.3, -1.3)
+    return [s]
+
+
+def with_minus(value: object) -> str:
+    """Write numbers with a minus sign, not a hyphen."""
+    return str(value).replace("-", "−")
+
+
+@dataclass(frozen=True)
+class Lane:
+    """A line of a timing diagram: a signal, what it means, and whether it is drawn as a number."""
+
+    signal: Any
+    meaning: str
+    number: bool = False
+
+
+@dataclass(frozen=True)
+class Timing:
+    """A timing diagram: some clocks of a block that the RTL runs, lane by lane.
+
+    Attributes
+    ----------
+    core : Part
+        The interpolator.
+    block : dict
+        The payload of ``blocks``, offered in clock 0.
+    lanes : dict of str to Lane
+        By the names that are drawn, from the top down.
+    clocks : range
+        The clocks to draw.
+    shaded : callable
+        Gives the clock to shade, from the values of the lanes.
+    shade_name : str
+        What is written below that clock.
+    arrows : callable
+        Gives the arrows, from the values of the lanes.
+    caption : str
+        What is run.
+    held : int or None
+        The clock in which a step that waits is not taken.
+    arrow, arrow_color : str
+        How WaveJSON writes the shape of the arrows, and their colour.
+    """
+
+    core: Part
+    block: dict[str, Any]
+    lanes: dict[str, Lane]
+    clocks: range
+    shaded: Callable[[Run], int]
+    shade_name: str
+    arrows: Callable[[Run], list[tuple[Spot, Spot]]]
+    caption: str
+    held: int | None = None
+    arrow: str = "~>"
+    arrow_color: str = CONTROL
+
+    def run(self) -> Run:
+        """Run the block; give the values of every lane, clock by clock."""
+        run: Run = {name: [] for name in self.lanes}
+
+        async def bench(ctx):
+            ctx.set(self.core.blocks.payload, self.block)
+            for clock in range(self.clocks.stop):
+                ctx.set(self.core.blocks.valid, clock == 0)
+                ctx.set(self.core.steps.ready, clock != self.held)
+                if clock in self.clocks:
+                    for name, lane in self.lanes.items():
+                        run[name].append(int(ctx.get(lane.signal)))
+                await ctx.tick()
+
+        simulator = Simulator(self.core)
+        simulator.add_clock(CLOCK_PERIOD)
+        simulator.add_testbench(bench)
+        simulator.run()
+        return run
+
+    def wave(self, run: Run) -> dict[str, Any]:
+        """Turn a run into WaveJSON."""
+        signal: list[dict[str, Any]] = [
+            {"name": "clock", "wave": "p" + "." * (len(self.clocks) - 1)}
+        ]
+        for name, values in run.items():
+            number = self.lanes[name].number
+            new = [i == 0 or value != values[i - 1] for i, value in enumerate(values)]
+            # A wave has a letter a clock: a level, 5 for a number in a blue box, a point for no
+            # change.
+            letters = ("5" if number else str(value) for value in values)
+            wave = (letter if n else "." for letter, n in zip(letters, new, strict=True))
+            lane: dict[str, Any] = {"name": name, "wave": "".join(wave)}
+            if number:
+                lane["data"] = [
+                    with_minus(value) for value, n in zip(values, new, strict=True) if n
+                ]
+            signal.append(lane)
+        rows = {name: row for row, name in enumerate(run, 1)}
+        first = self.clocks.start
+        return {
+            "signal": signal,
+            "edge": [
+                self.arrow.join(f"[{rows[name]}:{moment - first}]" for name, moment in arrow)
+                for arrow in self.arrows(run)
+            ],
+            "head": {"tock": first},
+            "shade": [f"{self.shaded(run) - first} * {SHADE}"],
+        }
+
+    def draw(self) -> Iterable[Element]:
+        """Draw it, with what the lanes mean beside them."""
+        run = self.run()
+        diagram = TimingDiagram(
+            self.wave(run),
+            namecolor=INK,
+            tickcolor=INK,
+            edgecolor=self.arrow_color,
+            gridcolor="#c9ced4",
+            fontsize=TEXT_SIZE,
+            datafontsize=TEXT_SIZE,
+        )
+        width, foot = len(self.clocks), round(-0.8 * len(self.lanes), 1)
+        room = 0.6 + 0.16 * max(len(lane.meaning) for lane in self.lanes.values())
+        s = Sheet(-2.6, foot - 1.3, width + room, 1.4)
+        for row, lane in enumerate(self.lanes.values(), 1):
+            s.words((width + 0.2, 0.18 - 0.8 * row), lane.meaning, color=QUIET)
+        shaded = self.shaded(run) - self.clocks.start
+        s.words((shaded + 0.5, foot - 0.45), self.shade_name, "center")
+        s.words((width / 2, foot - 0.95), self.caption, "center", QUIET)
+        return [s, diagram]
+
+
+def linear_carry() -> Timing:
+    """Show a carry of SX, and its step that has to wait for a clock."""
+    width, end, held = 8, (200, 99), 4
+    core = Linear(width, 2, normalize=False, preload="zero")
+    registers = core.registers
+
+    def arrows(run: Run) -> list[tuple[Spot, Spot]]:
+        carry = run["SX carry"].index(1)
+        waits = zip(run["steps.valid"], run["steps.ready"], strict=True)
+        taken = [valid and ready for valid, ready in waits].index(1)
+        return [
+            (("SX carry", carry), ("steps.valid", carry + 1)),
+            (("steps.ready", taken), ("P3 = XT", taken + 1)),
+        ]
+
+    return Timing(
+        core,
+        {"start": {"x": 0, "y": 0}, "end": dict(zip("xy", end, strict=True))},
+        {
+            "blocks.valid": Lane(core.blocks.valid, "a block is offered"),
+            "blocks.ready": Lane(core.blocks.ready, "and accepted"),
+            "УУ start": Lane(core.uu.start, "loads the registers"),
+            "УУ clock": Lane(core.uu.clock, "a summation in this clock"),
+            "P1 = ΔX": Lane(registers["p1"], "increment", number=True),
+            "SX": Lane(registers["sx"], f"sum modulo {1 << width}", number=True),
+            "SX carry": Lane(core.summator["x"].carry, f"the summation reaches {1 << width}"),
+            "P5 = KOX": Lane(registers["p5"], "steps left along x", number=True),
+            "steps.valid": Lane(core.steps.valid, "a step waits"),
+            "steps.ready": Lane(core.steps.ready, "and is taken"),
+            "P3 = XT": Lane(registers["p3"], "coordinate", number=True),
+            "done = край": Lane(core.done, "end of the block"),
+        },
+        range(10),
+        lambda _: held,
+        "held",
+        arrows,
+        f"block (0, 0) → {end}, n = {width}, no normalizer, preload 0",
+        held=held,
+    )
+
+
+def circular_turn() -> Timing:
+    """Show an arc that crosses an axis: the clock in which the frame is turned by 90°."""
+    width, start, end = 4, (5, 12), (-5, 12)
+    lecture: dict[str, Any] = Circular.LECTURE
+    core = Circular(width, **lecture)
+    registers, top = core.registers, (1 << width) - 1
+    clocks = range(16, 30)
+
+    def turn(run: Run) -> int:
+        return clocks[run["turns"].index(0) - 1]
+
+    def arrows(run: Run) -> list[tuple[Spot, Spot]]:
+        before, after = turn(run) + 0.68, turn(run) + 1.28
+        return [
+            ((source, before), (target, after))
+            for source, target in (("P2 = Y", "P1 = X"), ("SX", "SY"), ("SY", "SX"))
+        ]
+
+    step = core.steps.payload
+    points = {"start": start, "end": end, "center": (0, 0)}
+    return Timing(
+        core,
+        {
+            **{name: dict(zip("xy", point, strict=True)) for name, point in points.items()},
+            "clockwise": 0,
+            "full_turns": 0,
+        },
+        {
+            "УУ clock": Lane(core.uu.clock, "a summation in this clock, or the turn"),
+            "turns": Lane(registers["turns"], "axis crossings to come", number=True),
+            "swap": Lane(registers["swap"], "X is the machine’s y"),
+            "P1 = X": Lane(registers["p1"], "falls; P2 after the turn", number=True),
+            "P2 = Y": Lane(registers["p2"], "rises; 0 after the turn", number=True),
+            "P3 = KOX": Lane(registers["p3"], "steps of X left in this quadrant", number=True),
+            "P4 = KOY": Lane(registers["p4"], "steps of Y left in this quadrant", number=True),
+            "SX": Lane(registers["sx"], f"sum of Y; {top} − SY after the turn", number=True),
+            "SY": Lane(registers["sy"], "sum of X; SX after the turn", number=True),
+            "steps.valid": Lane(core.steps.valid, "a step waits, and is taken"),
+            "steps.x": Lane(step.x, "the step along x", number=True),
+            "steps.y": Lane(step.y, "the step along y", number=True),
+            "XT": Lane(registers["xt"], "coordinate", number=True),
+            "YT": Lane(registers["yt"], "coordinate", number=True),
+            "done = край": Lane(core.done, "end of the block"),
+        },
+        clocks,
+        turn,
+        "turn",
+        arrows,
+        f"block {start} → {with_minus(end)} around (0, 0), n = {width}, the lecture’s settings",
+        arrow="->",
+        arrow_color=EYE,
+    )
+
+
+#: The timing diagrams, by the names of their files.
+TIMINGS: dict[str, Callable[[], Timing]] = {
+    "linear-carry": linear_carry,
+    "circular-turn": circular_turn,
+}
 
 #: The pictures, by the names of their files.
 FIGURES: dict[str, Callable[[], Iterable[Element]]] = {
-    "linear-blocks": draw_blocks,
-    "linear-carry": draw_carry,
+    "linear-blocks": linear_blocks,
+    "linear-carry": lambda: linear_carry().draw(),
+    "circular-blocks": circular_blocks,
+    "circular-turn": lambda: circular_turn().draw(),
 }
 
 
