@@ -13,26 +13,37 @@ from io import TextIOWrapper
 from typing import Any, NoReturn, cast
 
 import click
-import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from discreta.hdl.circular import ORDERS
 from discreta.hdl.contract import (
     MAX_AXES,
+    MAX_GUARD,
     MAX_WIDTH,
     MIN_AXES,
     MIN_WIDTH,
     check_axes,
+    check_guard,
     check_width,
 )
 from discreta.hdl.parts import PRELOADS
 from discreta.hdl.verilog import verilog as emit_verilog
 from discreta.sim.compiled import compiler
+from discreta.sim.curves import Arc, Curve, Polyline
 from discreta.sim.methods import METHODS, Method
 from discreta.sim.outputs import Outputs
-from discreta.sim.points import BadInputError, check_line, parse_point, read_points, say_point
-from discreta.sim.run import run_path, say_choices
+from discreta.sim.points import (
+    MAX_TURNS,
+    BadInputError,
+    check_line,
+    check_turns,
+    parse_point,
+    read_points,
+    say_point,
+)
+from discreta.sim.run import run, say_choices
 from discreta.sim.simulate import ENGINES, DeadCoreError, default_engine
 
 __all__ = ["main"]
@@ -43,12 +54,16 @@ class _Point(click.ParamType):
 
     name = "X,Y"
 
+    def __init__(self, most: int):
+        self._most = most
+        self._count = f"{MIN_AXES} to {most}" if most > MIN_AXES else f"{MIN_AXES}"
+
     def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, ...]:
         point = parse_point(value.split(","))
-        if point is None or not MIN_AXES <= len(point) <= MAX_AXES:
+        if point is None or not MIN_AXES <= len(point) <= self._most:
             self.fail(
-                f"{value!r} is not a point: give {MIN_AXES} to {MAX_AXES} whole numbers of steps "
-                "with commas between, like 200,99",
+                f"{value!r} is not a point: give {self._count} whole numbers of steps with commas "
+                "between, like 200,99",
                 param,
                 ctx,
             )
@@ -103,54 +118,111 @@ def _width_option(default: int) -> Callable:
         type=_Number("width", MIN_WIDTH, MAX_WIDTH, check_width),
         default=default,
         show_default=True,
-        help="Bits of the device, 4 to 32: lines are up to 2^N - 1 steps long, coordinates lie "
-        "between -2^N and 2^N - 1.",
+        help="Bits of the device, 4 to 32: lines and radii are up to 2^N - 1 steps long, "
+        "coordinates lie between -2^N and 2^N - 1.",
     )
 
 
 _width = _width_option(16)
 
-_axes = click.option(
-    "--axes",
-    type=_Number("number of axes", MIN_AXES, MAX_AXES, check_axes),
-    default=2,
-    show_default=True,
-    help="2 to 6.",
-)
-_preload = click.option(
-    "--preload",
-    type=click.Choice(PRELOADS),
-    default="half",
-    show_default=True,
-    help="What the summators start from: 0, or half of what they hold.",
-)
-_normalize = click.option(
-    "--normalize/--no-normalize",
-    default=True,
-    show_default=True,
-    help="Shift the increments left together first: fewer clocks, the same bound of the error.",
-)
-_run_options = _options(
+
+def _defaults(choice: str) -> str:
+    """Say what a choice is by default, in every setting, as the methods that have it agree."""
+    words = []
+    for setting in ("default", "lecture"):
+        values = [
+            method.settings[setting][choice]
+            for method in METHODS.values()
+            if choice in method.settings[setting]
+        ]
+        words.append(say_choices({choice: values[0]}).removeprefix(f"{choice} "))
+    return f"[default: {words[0]}; lecture: {words[1]}]"
+
+
+_setting_options = _options(
     click.option(
-        "--method",
-        type=_MethodName(),
-        default="linear",
+        "--setting",
+        metavar="NAME",
+        default="default",
         show_default=True,
-        help="See `discreta methods`.",
+        help="Values of the options below that are not given: default, or lecture, the machine of "
+        "the documents.",
     ),
-    _width,
-    _preload,
-    _normalize,
     click.option(
-        "--engine",
-        type=click.Choice(ENGINES),
-        help="[default: compiled where there is a C++ compiler and no --vcd, else pysim]",
+        "--preload",
+        type=click.Choice(PRELOADS),
+        help=f"What the summators start from: 0, or half of what they hold. {_defaults('preload')}",
     ),
-    click.option("--trace", metavar="FILE.csv|-", help="Every step: clock, then the coordinates."),
-    click.option("--vcd", metavar="FILE.vcd", help="Waveform, with a .gtkw view beside it."),
-    click.option("--plot", metavar="FILE.svg|.png", help="Picture of the path and its error."),
-    click.option("--json", "summary_file", metavar="FILE|-", help="The summary, as JSON."),
+    click.option(
+        "--normalize/--no-normalize",
+        default=None,
+        help="Shift what is summed left first, as far as it goes: fewer clocks. "
+        f"{_defaults('normalize')}",
+    ),
+    click.option(
+        "--order",
+        type=click.Choice(ORDERS),
+        help="Arcs: SY adds the X that SX has just moved, or that from before the clock. "
+        f"{_defaults('order')}",
+    ),
+    click.option(
+        "--guard",
+        type=_Number("number of guard bits", 0, MAX_GUARD, check_guard),
+        help="Arcs: bits more in the summators, 0 to 4: each halves the increments, for less "
+        f"error in twice the clocks. {_defaults('guard')}",
+    ),
 )
+#: What these give besides the setting.
+_CHOICES = ("preload", "normalize", "order", "guard")
+
+
+def _run_options(method: str) -> Callable:
+    return _options(
+        click.option(
+            "--method",
+            type=_MethodName(),
+            default=method,
+            show_default=True,
+            help="See `discreta methods`.",
+        ),
+        _width,
+        _setting_options,
+        click.option(
+            "--engine",
+            type=click.Choice(ENGINES),
+            help="[default: compiled where there is a C++ compiler and no --vcd, else pysim]",
+        ),
+        click.option(
+            "--trace", metavar="FILE.csv|-", help="Every step: clock, then the coordinates."
+        ),
+        click.option("--vcd", metavar="FILE.vcd", help="Waveform, with a .gtkw view beside it."),
+        click.option("--plot", metavar="FILE.svg|.png", help="Picture of the path and its error."),
+        click.option("--json", "summary_file", metavar="FILE|-", help="The summary, as JSON."),
+    )
+
+
+def _chosen(method: Method, setting: str, given: dict[str, Any]) -> dict[str, Any]:
+    """Give a method's choices: those of a setting, and in their place what is given.
+
+    Raises
+    ------
+    BadInputError
+        The method has no such setting or choice.
+    """
+    if setting not in method.settings:
+        raise BadInputError(
+            f"--setting {setting}: choose {' or '.join(method.settings)} for {method.name}"
+        )
+    choices = dict(method.settings[setting])
+    for name, value in given.items():
+        if value is not None and name not in choices:
+            raise BadInputError(
+                f"--{name} is no option of {method.name}, which has "
+                f"{' and '.join(f'--{choice}' for choice in choices)}: leave it out"
+            )
+        if value is not None:
+            choices[name] = value
+    return choices
 
 
 class _Commands(click.Group):
@@ -185,9 +257,11 @@ def simulate_group() -> None:
 
 
 @simulate_group.command("line")
-@click.option("--start", type=_Point(), required=True, help="Where the line begins, in steps.")
-@click.option("--end", type=_Point(), required=True, help="Where it ends.")
-@_run_options
+@click.option(
+    "--start", type=_Point(MAX_AXES), required=True, help="Where the line begins, in steps."
+)
+@click.option("--end", type=_Point(MAX_AXES), required=True, help="Where it ends.")
+@_run_options("linear")
 def simulate_line(start: tuple[int, ...], end: tuple[int, ...], width: int, **options: Any) -> None:
     """Run one line in two to six axes.
 
@@ -200,12 +274,12 @@ def simulate_line(start: tuple[int, ...], end: tuple[int, ...], width: int, **op
             f"--start has {len(start)} coordinates and --end has {len(end)}: give both as many"
         )
     check_line(start, end, width)
-    _simulate(np.array([start, end], dtype=np.int64), width=width, **options)
+    _simulate(Polyline([start, end]), width=width, **options)
 
 
 @simulate_group.command("path")
 @click.argument("file", metavar="FILE.csv")
-@_run_options
+@_run_options("linear")
 def simulate_path(file: str, width: int, **options: Any) -> None:
     """Run a polyline of support points without a gap.
 
@@ -215,10 +289,55 @@ def simulate_path(file: str, width: int, **options: Any) -> None:
 
     Example: discreta simulate path examples/bulgaria.csv --plot border.svg
     """
-    _simulate(read_points(file, width), width=width, reads=(file,), **options)
+    _simulate(Polyline(read_points(file, width)), width=width, reads=(file,), **options)
 
 
-def _simulate(points: np.ndarray, **options: Any) -> None:
+@simulate_group.command("arc")
+@click.option("--start", type=_Point(2), required=True, help="Where the arc begins, in steps.")
+@click.option(
+    "--end",
+    type=_Point(2),
+    required=True,
+    help="Where it ends, on the circle of the start or up to a step off it; the start itself is a "
+    "full turn away.",
+)
+@click.option("--center", type=_Point(2), required=True, help="The center of the circle.")
+@click.option(
+    "--direction",
+    type=click.Choice(["ccw", "cw"]),
+    required=True,
+    help="Counter-clockwise, as seen with x to the right and y upwards, or clockwise.",
+)
+@click.option(
+    "--turns",
+    type=_Number("number of turns", 1, MAX_TURNS, check_turns),
+    default=1,
+    show_default=True,
+    help=f"The turn in which it ends, up to {MAX_TURNS}, like the P of G2 and G3.",
+)
+@_run_options("circular")
+def simulate_arc(
+    start: tuple[int, ...],
+    end: tuple[int, ...],
+    center: tuple[int, ...],
+    direction: str,
+    turns: int,
+    **options: Any,
+) -> None:
+    """Run one arc of a circle, up to 256 turns of it.
+
+    In the summary, turn is the angle in degrees, positive counter-clockwise. Exits 1 when the end
+    is not reached.
+
+    \b
+    Example: discreta simulate arc --start 100,0 --end 0,100 \\
+                 --center 0,0 --direction ccw
+    """
+    _simulate(Arc(start, end, center, clockwise=direction == "cw", turns=turns), **options)
+
+
+def _simulate(curve: Curve, *, method: Method, setting: str, **options: Any) -> None:
+    choices = _chosen(method, setting, {name: options.pop(name) for name in _CHOICES})
     trace, vcd = options["trace"], options["vcd"]
     # Without a word the run would only seem slow.
     slow = options["engine"] is None and vcd is None and default_engine() == "pysim"
@@ -233,7 +352,7 @@ def _simulate(points: np.ndarray, **options: Any) -> None:
             show(done, total)
 
         began = time.perf_counter()
-        summary = run_path(points, progress=progress, **options)
+        summary = run(curve, method, progress=progress, **options, **choices)
         seconds = time.perf_counter() - began
     _print_summary(summary, seconds, err="-" in (trace, options["summary_file"]))
     if not summary["end point reached"]:
@@ -274,20 +393,26 @@ def _out() -> Console:
 @cli.command()
 @click.argument("method", type=_MethodName())
 @_width
-@_axes
-@_preload
-@_normalize
+@click.option(
+    "--axes",
+    type=_Number("number of axes", MIN_AXES, MAX_AXES, check_axes),
+    default=2,
+    show_default=True,
+    help="2 to 6 for lines, 2 for arcs.",
+)
+@_setting_options
 @click.option("--output", metavar="FILE.v", default="-", help="[default: standard output]")
-def verilog(
-    method: Method, width: int, axes: int, preload: str, normalize: bool, output: str
-) -> None:
+def verilog(method: Method, width: int, axes: int, setting: str, output: str, **given: Any) -> None:
     """Write a method as Verilog-2005 with plain ports.
 
     Example: discreta verilog linear --width 16 --output linear.v
     """
+    if axes not in method.axes:
+        raise BadInputError(f"--axes {axes}: {method.name} has {method.axes[0]} axes: leave it out")
+    choices = _chosen(method, setting, given)
     with Outputs() as outputs:
         file = outputs.open(output)
-        core = method.device(width, axes, normalize=normalize, preload=preload)
+        core = method.core(width, axes, **choices)
         file.write(emit_verilog(core, f"discreta_{method.name}"))
 
 
@@ -297,22 +422,23 @@ def verilog(
 def prove(methods: tuple[Method, ...], width: int) -> None:
     """Prove a method: RTL = golden model, and its promises, for every block of a width.
 
-    All options of the method are proven, in the plane. Exits 1 when something does not hold, with
-    the values that break it.
+    All options of the method are proven, in the plane; what they share is proven once. What is
+    marked as checked was run in every case there is, which it names. Exits 1 when something does
+    not hold, with the values that break it.
 
     Example: discreta prove linear --width 32
     """
     try:
-        from discreta.sim.prover import prove_variant
+        from discreta.sim.prover import parts, prove_variant
     except ModuleNotFoundError as error:
         raise BadInputError(
             f"proofs need {error.name}: install the extra, pip install 'discreta[prove]'"
         ) from None
     out = Console(highlight=False, soft_wrap=True)
-    jobs = [(method, variant) for method in methods for variant in method.variants()]
+    jobs = [(method, variant) for method in methods for variant in parts(method.name)]
     good = True
     began = time.perf_counter()
-    count = 0
+    count = {"proven": 0, "checked": 0}
     with ProcessPoolExecutor(min(len(jobs), os.cpu_count() or 1)) as pool:
         results = pool.map(
             prove_variant,
@@ -326,72 +452,111 @@ def prove(methods: tuple[Method, ...], width: int) -> None:
                 zip(jobs, results, strict=True), start=1
             ):
                 show(done, len(jobs))
-                out.print(f"{method.name}, width {width}, {say_choices(variant)}")
+                what = "every variant" if variant is None else say_choices(variant)
+                out.print(f"{method.name}, width {width}, {what}")
                 for verdict in verdicts:
-                    mark = "proven" if verdict.holds else "FAILED"
-                    out.print(f"  {mark} {verdict.seconds:6.2f} s  {verdict.title}", markup=False)
+                    kind = "checked" if verdict.exhaustive else "proven"
+                    mark = kind if verdict.holds else "FAILED"
+                    took = f"{verdict.seconds:{12 - len(mark)}.2f} s"
+                    out.print(f"  {mark} {took}  {verdict.title}", markup=False)
                     if not verdict.holds:
                         out.print(f"         {verdict.counterexample}", markup=False)
-                count += sum(verdict.holds for verdict in verdicts)
+                    count[kind] += verdict.holds
                 good &= all(verdict.holds for verdict in verdicts)
     seconds = time.perf_counter() - began
-    out.print(f"{count} proven, {'all hold' if good else 'NOT ALL HOLD'}, {seconds:.1f} s")
+    counted = f"{count['proven']} proven, "
+    counted += f"{count['checked']} checked in every case, " if count["checked"] else ""
+    out.print(f"{counted}{'all hold' if good else 'NOT ALL HOLD'}, {seconds:.1f} s")
     if not good:
         raise click.exceptions.Exit(1)
 
 
-@cli.command("survey", short_help="Run every line of a width and compare every register.")
+@cli.command("survey", short_help="Run every block there is and compare every register.")
 @click.argument("method", type=_MethodName())
 @_width_option(8)
-def survey_command(method: Method, width: int) -> None:
-    """Run every line of a width, or a seeded sample, and judge every register at every clock.
+@click.option(
+    "--setting",
+    metavar="NAME",
+    help="One setting alone, default or lecture. [default: every combination of the options]",
+)
+@click.option(
+    "--whole-degrees",
+    is_flag=True,
+    help="Arcs: instead of the usual ones all that lead from one whole degree to another on 66 "
+    "circles, their points rounded to whole steps.",
+)
+def survey_command(method: Method, width: int, setting: str | None, whole_degrees: bool) -> None:
+    """Run all blocks of a kind, or a seeded sample, and judge every step and every register.
 
-    Runs on the compiled engine. Exits 1 when a register differs from the golden model or an end is
-    missed.
+    Lines: of all lengths. Arcs: all quarter arcs and circles about the origin, some circles ten
+    times round, and a sample of any arcs. Clocks are those in which the device sums, per step of
+    the axis that moves faster. Runs on the compiled engine. Exits 1 when a register differs from
+    the golden model or an end is missed.
 
     Example: discreta survey linear --width 8
     """
-    from discreta.sim.survey import SEED, SurveyRow, survey, survey_lines
+    from discreta.sim import groups as choice
+    from discreta.sim.survey import SurveyRow, say_worst, survey
 
     if default_engine() != "compiled":
         raise BadInputError("a survey needs the compiled engine: install a C++ compiler")
+    variants = method.variants()
+    if setting is not None:
+        chosen = _chosen(method, setting, {})
+        variants = [variant for variant in variants if variant == chosen]
     try:
-        blocks, exhaustive = survey_lines(width)
+        choose = choice.whole_degrees if whole_degrees else choice.survey_groups
+        groups = choose(method, width)
     except ValueError as error:
         raise BadInputError(str(error)) from None
-    variants = method.variants()
-    rows = [SurveyRow(variant) for variant in variants]
+    rows = [[SurveyRow(variant, number) for variant in variants] for number in range(len(groups))]
+    total = sum(len(group.blocks) for group in groups) * len(variants)
+    ran = 0
     began = time.perf_counter()
-    with _progress("lines") as show:
-        for part in survey(method, width):
-            rows[variants.index(part.variant)].add(part)
-            show(sum(row.lines for row in rows), len(blocks) * len(variants))
+    with _progress(f"{method.curve}s") as show:
+        show(0, total)
+        for part in survey(method, width, groups, variants):
+            rows[part.group][variants.index(part.variant)].add(part)
+            ran += part.blocks
+            show(ran, total)
     seconds = time.perf_counter() - began
 
     out = _out()
-    kind = "all" if exhaustive else f"a sample (seed {SEED}) of"
-    out.print(f"{method.name}, width {width}: {kind} {len(blocks)} lines, every register compared")
-    table = Table(box=None, pad_edge=False)
-    for heading in ("variant", "largest error", "on the line", "at", "clocks/step", "ends missed"):
-        table.add_column(heading, justify="left" if heading == "variant" else "right")
-    for row in rows:
-        table.add_row(
-            say_choices(row.variant),
-            f"{row.largest_error:.4f}",
-            say_point(row.error_at[:2]),
-            say_point(row.error_at[2:]),
-            f"{row.summations / row.longest:.4f}",
-            str(row.ends_missed),
-        )
-    out.print(table)
-    clocks = sum(row.clocks for row in rows)
+    for group, found in zip(groups, rows, strict=True):
+        every = all(row.compared == row.blocks for row in found)
+        compared = "every register" if every else f"registers of some (seed {choice.SEED})"
+        refused = sum(group.answers != 0)
+        to_refuse = f", {refused} to be refused" if refused else ""
+        title = f"{method.name}, width {width}: {group.title}{to_refuse}, {compared} compared"
+        headings = ["variant", "largest error", f"on the {method.curve}", "at", "clocks/step"]
+        headings += ["ends missed"]
+        headings += ["completed"] if method.curve == "arc" else []
+        headings += [] if every else ["compared"]
+        table = Table(box=None, pad_edge=False)
+        for heading in headings:
+            table.add_column(heading, justify="left" if heading == "variant" else "right")
+        for row in found:
+            cells = {
+                "variant": say_choices(row.variant),
+                "largest error": f"{row.largest_error:.4f}",
+                "clocks/step": f"{row.summations / row.length:.4f}",
+                "ends missed": str(row.ends_missed),
+                "completed": str(row.completed),
+                "compared": str(row.compared),
+            }
+            cells[f"on the {method.curve}"], cells["at"] = say_worst(method, group, row)
+            table.add_row(*(cells[heading] for heading in headings))
+        out.print(title, soft_wrap=True)
+        out.print(table)
+    every_row = [row for found in rows for row in found]
+    clocks = sum(row.clocks for row in every_row)
     out.print(
         f"{clocks} clocks of RTL in {seconds:.1f} s, {clocks / seconds / 1e6:.1f} million a second"
     )
-    for row in rows:
-        for mismatch in row.mismatches:
-            click.echo(f"{say_choices(row.variant)}: {mismatch}", err=True)
-    if not all(row.good for row in rows):
+    for row in every_row:
+        for finding in row.findings:
+            click.echo(f"{say_choices(row.variant)}: {finding}", err=True)
+    if not all(row.good for row in every_row):
         raise click.exceptions.Exit(1)
 
 

@@ -38,10 +38,11 @@ class ArcInput(Part):
     falling and Y rising: a clockwise arc is mirrored along y, and the quadrant of the start is
     turned onto the first. Seen so from the centre,
 
-    - ``from_xy`` is the start and ``to_xy`` the end, each in its own quadrant turned onto the first;
-    - ``swap`` is 1 when X is the machine's y, that is when the start is in quadrant II or IV;
+    - ``from_xy`` is the start and ``to_xy`` the end, each in its own quadrant turned onto the
+      first;
+    - ``first_swap`` is 1 when X is the machine's y, that is when the start is in quadrant II or IV;
     - ``negative`` is the direction in which each of the machine's axes moves first;
-    - ``turns`` is the number of axis crossings between start and end;
+    - ``first_turns`` is the number of axis crossings between start and end;
     - ``limit`` = ⌊R⌋ + 1 is as far as an arc that crosses an axis may go along it.
 
     A start on an axis belongs to the quadrant after it, an end on an axis to the one before it, as
@@ -52,12 +53,12 @@ class ArcInput(Part):
 
     ``fault`` is ``RANGE`` when a coordinate seen from the centre does not fit n bits, or when the
     arc crosses an axis and ``limit`` does not fit n bits or leads, from the centre, out of the
-    coordinates −2^n … 2^n − 1 at one of the crossings. Otherwise it is ``OFF_CURVE`` when the end is
-    more than one step off the circle of the start, or the start is the centre and the end is not.
-    ``empty``: start, end and centre are one point (with a fault it says nothing).
+    coordinates −2^n … 2^n − 1 at one of the crossings. Otherwise it is ``OFF_CURVE`` when the end
+    is more than one step off the circle of the start, or the start is the centre and the end is
+    not. ``empty``: start, end and centre are one point (with a fault it says nothing).
 
     Latency: a block accepted in clock 0 is ``pending`` in clock 2n + 5. Throughput: a block in 2n +
-    5 clocks, one block ahead of the running one; ``held`` from the clock after its acceptance until
+    6 clocks, one block ahead of the running one; ``held`` from the clock after its acceptance until
     ``take`` gives it away. Reset: nothing held. Overflow: reported by ``fault``. Error: none, it is
     exact.
     Source: lecture, circular interpolation (the centre is the origin, only the first quadrant,
@@ -90,9 +91,9 @@ class ArcInput(Part):
                 "start": Out(point_layout(width, 2)),
                 "from_xy": Out(seen),
                 "to_xy": Out(seen),
-                "swap": Out(1),
+                "first_swap": Out(1),
                 "negative": Out(per_axis(2, 1)),
-                "turns": Out(TURNS_BITS),
+                "first_turns": Out(TURNS_BITS),
                 "limit": Out(width),
             }
         )
@@ -121,8 +122,8 @@ class ArcInput(Part):
             self.pending.eq(self.held & ~meter.busy),
             self.fault.eq(self.fault_register),
             self.empty.eq(self.empty_register),
-            self.swap.eq(self.swap_register),
-            self.turns.eq(self.turns_register),
+            self.first_swap.eq(self.swap_register),
+            self.first_turns.eq(self.turns_register),
             meter.load.eq(accept),
         ]
         for a in "xy":
@@ -135,7 +136,7 @@ class ArcInput(Part):
 
         begin = _Seen(m, "begin", block.start, block.center, block.clockwise, n)
         finish = _Seen(m, "finish", block.end, block.center, block.clockwise, n)
-        first, last = Signal(2), Signal(2)
+        first, last = Signal(2, name="first"), Signal(2, name="last")
         with m.If(begin.right & ~begin.below):
             m.d.comb += first.eq(0)
         with m.Elif(~begin.right & begin.above):
@@ -161,15 +162,18 @@ class ArcInput(Part):
             meter.initial_end.y.eq(Mux(last[0], finish.far["x"], finish.far["y"])),
         ]
 
-        same_quadrant, ahead, too_far = Signal(), Signal(), Signal()
+        same_quadrant, ahead, too_far = (
+            Signal(name=name) for name in ("same_quadrant", "ahead", "too_far")
+        )
         m.d.comb += [
-            same_quadrant.eq(self.turns[:2] == 0),
+            same_quadrant.eq(self.first_turns[:2] == 0),
             ahead.eq(
                 (meter.end.x <= meter.start.x)
                 & (meter.end.y >= meter.start.y)
                 & (meter.end != meter.start)
             ),
-            too_far.eq((self.turns != 0) & self._too_far(m)),
+            # A block of no length crosses nothing, though its quadrants are not the same.
+            too_far.eq((self.first_turns != 0) & ~meter.zero & self._too_far(m)),
         ]
         with m.If(self.take):
             m.d.sync += self.held_register.eq(0)
@@ -188,7 +192,7 @@ class ArcInput(Part):
                 *[self.center_registers[a].eq(block.center[a]) for a in "xy"],
             ]
         with m.Elif(meter.squared & same_quadrant & ~ahead):
-            m.d.sync += self.turns_register.eq(self.turns + 4)
+            m.d.sync += self.turns_register.eq(self.first_turns + 4)
         with m.Elif(meter.measured):
             m.d.sync += self.empty_register.eq(meter.zero)
             with m.If(too_far):
@@ -200,7 +204,7 @@ class ArcInput(Part):
     def _too_far(self, m: Module) -> Signal:
         """Tell whether an arc that crosses axes does not fit."""
         n = self.width
-        limit = Signal(n + 2)
+        limit = Signal(n + 2, name="reach")
         m.d.comb += [limit.eq(self.meter.root[1:] + 1), self.limit.eq(limit)]
         out = Signal(4)
         for index, a in enumerate("xy"):
@@ -208,12 +212,12 @@ class ArcInput(Part):
             below = Cat(self.center_registers[a][:-1], ~self.center_registers[a][-1])
             first = Signal(2, name=f"crossed_{a}")
             # The axis that rises is crossed first, the other next, then both the other way.
-            rises = self.swap if a == "x" else ~self.swap
+            rises = self.first_swap if a == "x" else ~self.first_swap
             m.d.comb += first.eq(Mux(rises, 0, 1))
             for again in range(2):
                 negative = self.negative[a] ^ again
                 room = Mux(negative, below, ~below)
-                crossed = self.turns > first + 2 * again
+                crossed = self.first_turns > first + 2 * again
                 m.d.comb += out[2 * index + again].eq(crossed & (limit > room))
         return out.any() | (limit > Const((1 << n) - 1, n))
 

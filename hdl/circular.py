@@ -67,10 +67,10 @@ class Circular(Part):
     it is summed. A carry is a step in the next clock. ``done`` follows the last step by a clock.
 
     Throughput: one summation a clock, one clock for every axis crossing. A turn of radius R takes
-    about 2π·2^(n + g) summations, with ``normalize`` about 5.6·2^g·2^bitlen(R) or fewer. The next
-    block is prepared while this one runs and is started in the very clock in which the last step is
-    taken, if 2n + 5 clocks have gone since its acceptance. A block of no length (start = end =
-    centre) and a rejected block take one clock, and one more behind a block that moved.
+    about 2π·2^(n + g) summations, with ``normalize`` between π and 2π times 2^(bitlen(R) + g). The
+    next block is prepared while this one runs and is started in the very clock in which the last
+    step is taken, if 2n + 5 clocks have gone since its acceptance. A block of no length (start =
+    end = centre) and a rejected block take one clock, and one more behind a block that moved.
 
     Steps: ``steps`` holds a step until it is taken and everything waits for it. ``position`` shows
     the steps taken, not the one that waits; starting a block loads it with the block's start.
@@ -293,21 +293,24 @@ class Circular(Part):
                 m.d.sync += self.fresh.eq(0)
 
         # The summators, each with the other axis's coordinate.
-        lower = Signal(self.width)
-        m.d.comb += lower.eq(Mux(p1.register == 0, 0, p1.register - 1))
-        x, y, x_after = p1.register, p2.register, lower
-        if self.normalize:
+        coordinates = [p1.register, p2.register]
+        if self.order == "alternated":
             # X − 1 is never the largest: it is shifted along and changes nothing.
-            m.submodules.normalizer = normalizer = Normalizer(self.width, 3)
-            m.d.comb += Cat(normalizer.increments.as_value()).eq(Cat(x, y, lower))
-            x, y, x_after = (normalizer.normalized[a] for a in "xyz")
+            lower = Signal(self.width)
+            m.d.comb += lower.eq(Mux(p1.register == 0, 0, p1.register - 1))
+            coordinates.append(lower)
+        if self.normalize:
+            m.submodules.normalizer = normalizer = Normalizer(self.width, len(coordinates))
+            m.d.comb += normalizer.increments.as_value().eq(Cat(coordinates))
+            coordinates = [normalizer.normalized[a] for a in "xyz"[: len(coordinates)]]
+        x, y, *lowered = coordinates
         half_increment = (y >> 1) if self.halves else 0
         m.d.comb += [
             sx.addend.eq(y),
             sx.enable.eq(add & ~p3.zero & ~self.backward),
             sx.load.eq(uu.load | turn | halve),
             sx.initial.eq(Mux(turn, ~sy.register, sx.preloaded - half_increment)),
-            sy.addend.eq(Mux(sx.carry, x_after, x) if self.order == "alternated" else x),
+            sy.addend.eq(Mux(sx.carry, lowered[0], x) if lowered else x),
             sy.enable.eq(add & ~p4.zero),
             sy.load.eq(uu.load | turn),
             sy.initial.eq(Mux(turn, sx.register, sy.preloaded)),
@@ -317,7 +320,7 @@ class Circular(Part):
                 m.d.comb += sx.initial.eq(sx.preloaded)
 
         # Steps: carries, or what is left when there can be no more carries.
-        step_x, step_y = Signal(), Signal()
+        step_x, step_y = Signal(name="step_x"), Signal(name="step_y")
         m.d.comb += [
             step_x.eq(sx.carry | (complete & ~p3.zero)),
             step_y.eq(sy.carry | (complete & ~p4.zero)),
@@ -344,7 +347,7 @@ class Circular(Part):
             limit.initial.eq(inp.limit),
         ]
         one_piece = Signal()
-        m.d.comb += one_piece.eq(inp.turns == 0)
+        m.d.comb += one_piece.eq(inp.first_turns == 0)
         with m.If(uu.load):
             m.d.comb += [
                 p1.initial.eq(inp.from_xy.x),
@@ -353,8 +356,8 @@ class Circular(Part):
                 p4.initial.eq(Mux(one_piece, inp.to_xy.y, inp.limit) - inp.from_xy.y),
             ]
             m.d.sync += [
-                self.turns.eq(inp.turns),
-                self.swap.eq(inp.swap),
+                self.turns.eq(inp.first_turns),
+                self.swap.eq(inp.first_swap),
                 self.backward.eq(0),
             ]
         with m.Else():

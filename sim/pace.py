@@ -20,7 +20,7 @@ class Pace:
     Attributes
     ----------
     summations : int
-        Clocks in which the summators add.
+        Clocks in which the device runs: the summators add, or the frame of an arc is turned.
     """
 
     summations: int = 0

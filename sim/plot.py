@@ -1,10 +1,11 @@
-"""The path as a picture: the true lines, the staircase that was stepped, and the error along it."""
+"""The path as a picture: the true curve, the staircase that was stepped, and the error along it."""
 
 from pathlib import Path
 
 import numpy as np
 
 from discreta.hdl.contract import AXIS_LETTERS
+from discreta.sim.curves import Curve
 from discreta.sim.points import BadInputError
 
 __all__ = ["FORMATS", "PathPlot", "picture_format"]
@@ -17,8 +18,12 @@ _POINTS = 1 << 17
 #: Columns of the error's curve: with more steps each has the largest error of several.
 _COLUMNS = 1 << 11
 
-#: Half the side of the window at the largest error, in steps, and the steps kept around it.
-_SIDE, _NEAR = 7, 12
+#: Half the side of the window at the largest error, in steps, and the steps kept on either side of
+#: it: half a turn of the largest circle whose other side the window can show.
+_SIDE, _NEAR = 7, 28
+
+#: Letters of a title in the common size; of longer ones they are smaller.
+_TITLE = 56
 
 
 def picture_format(name: str) -> str:
@@ -42,15 +47,14 @@ class PathPlot:
 
     Parameters
     ----------
-    corners : array of int64, shape (points, axes)
-        The support points of the true path, in steps.
+    curve : Curve
+        The true path.
     """
 
-    def __init__(self, corners: np.ndarray):
-        self._axes = corners.shape[1]
-        self._corners = corners[:, :2]
+    def __init__(self, curve: Curve):
+        self._curve = curve
         self._seen = 1
-        self._recent = corners[:1, :2]
+        self._recent = curve.start[None, :2]
         # Every stride-th point.
         self._points = [self._recent]
         self._kept = self._stride = 1
@@ -116,8 +120,8 @@ class PathPlot:
                 height_ratios=[3, 1],
                 width_ratios=[1.7, 1],
             ).values()
-            if self._axes > 2:
-                title += f"; x and y of {AXIS_LETTERS[: self._axes]}"
+            if self._curve.axes > 2:
+                title += f"; x and y of {AXIS_LETTERS[: self._curve.axes]}"
             self._draw_path(whole, title)
             self._draw_window(near)
             self._draw_errors(along)
@@ -129,12 +133,14 @@ class PathPlot:
         points = np.concatenate(self._points)
         if self._stride > 1:
             points = np.concatenate([points, self._recent[-1:]])
-        axes.plot(*self._corners.T, color="#2c7fb8", lw=1.6, label="true path", gid="true")
+        true = self._curve.outline()[:, :2]
+        axes.plot(*true.T, color="#2c7fb8", lw=1.6, label="true path", gid="true")
         axes.plot(*points.T, color="#222222", lw=0.7, label="steps taken", gid="steps")
-        axes.plot(*self._corners[0], "o", color="#2ca02c", ms=8, label="start")
+        axes.plot(*self._curve.start[:2], "o", color="#2ca02c", ms=8, label="start")
         axes.plot(*points[-1], "s", color="#c0392b", ms=4, label="end")
         axes.set_aspect("equal", adjustable="datalim")
         axes.set(title=title, xlabel="x, steps", ylabel="y, steps")
+        axes.title.set_fontsize(axes.title.get_fontsize() * min(1, _TITLE / len(title)))
         axes.locator_params(integer=True)
         axes.grid(alpha=0.3)
 
@@ -143,7 +149,8 @@ class PathPlot:
             axes.set_axis_off()
             return
         x, y = self._center
-        axes.plot(*self._corners.T, color="#2c7fb8", lw=1.6)
+        true = self._curve.near(self._center, 2 * _SIDE)[:, :2]
+        axes.plot(*true.T, color="#2c7fb8", lw=1.6, gid="true-near")
         axes.plot(*self._window.T, "o-", color="#222222", lw=0.9, ms=3, gid="near")
         axes.plot(x, y, "o", color="#c0392b", ms=6)
         axes.set_aspect("equal", adjustable="box")
@@ -154,7 +161,9 @@ class PathPlot:
             xlim=(x - _SIDE, x + _SIDE),
             ylim=(y - _SIDE, y + _SIDE),
         )
-        axes.locator_params(integer=True, nbins=5)
+        # Long numbers are written out, and fewer.
+        axes.locator_params(integer=True, nbins=5 if max(abs(x), abs(y)) < 10**6 else 3)
+        axes.ticklabel_format(useOffset=False, style="plain")
         axes.grid(alpha=0.3)
 
     def _draw_errors(self, axes) -> None:

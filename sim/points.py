@@ -3,14 +3,29 @@
 import csv
 import re
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from math import isqrt
 from pathlib import Path
 
 import numpy as np
 
 from discreta.hdl.contract import AXIS_LETTERS, MAX_AXES, MAX_WIDTH, MIN_AXES
+from discreta.sim.arcs import OFF_CURVE, RANGE, limits, reaches, refusals, squared_radii
 
-__all__ = ["BadInputError", "check_line", "check_path", "parse_point", "read_points", "say_point"]
+__all__ = [
+    "MAX_TURNS",
+    "BadInputError",
+    "check_arc",
+    "check_line",
+    "check_path",
+    "check_turns",
+    "parse_point",
+    "read_points",
+    "say_point",
+]
+
+#: An arc ends in its 256th turn at the latest.
+MAX_TURNS = 256
 
 _WHOLE_NUMBER = re.compile(r"\s*[+-]?[0-9]{1,1000}\s*")
 
@@ -45,19 +60,25 @@ def check_line(start: Sequence[int], end: Sequence[int], width: int) -> None:
         A coordinate or a length is out of range.
     """
     modulus = 1 << width
-    for point in (start, end):
-        for value in point:
-            if not -modulus <= value < modulus:
-                raise BadInputError(
-                    f"coordinate {_cut(str(value))[1:-1]} is out of range: width {width} has room "
-                    f"for {-modulus} to {modulus - 1}; {_wider(value if value >= 0 else ~value)}"
-                )
+    _check_coordinates((start, end), width)
     length = max(abs(b - a) for a, b in zip(start, end, strict=True))
     if length >= modulus:
         raise BadInputError(
             f"the line from {say_point(start)} to {say_point(end)} is {length} steps long: "
             f"width {width} has room for {modulus - 1}; {_wider(length)}"
         )
+
+
+def _check_coordinates(points: Iterable[Sequence[int]], width: int) -> None:
+    """Refuse coordinates that ``width`` bits and a sign have no room for."""
+    modulus = 1 << width
+    for point in points:
+        for value in point:
+            if not -modulus <= value < modulus:
+                raise BadInputError(
+                    f"coordinate {_cut(str(value))[1:-1]} is out of range: width {width} has room "
+                    f"for {-modulus} to {modulus - 1}; {_wider(value if value >= 0 else ~value)}"
+                )
 
 
 def check_path(points: np.ndarray, width: int) -> None:
@@ -75,12 +96,111 @@ def check_path(points: np.ndarray, width: int) -> None:
         check_line(points[max(0, index - 1)].tolist(), points[index].tolist(), width)
 
 
+def check_turns(turns: int) -> None:
+    """Raise :class:`BadInputError` unless an arc can end in turn number ``turns``."""
+    if not 1 <= turns <= MAX_TURNS:
+        raise BadInputError(
+            f"number of turns is {_cut(str(turns))[1:-1]}: choose a whole number from 1 to "
+            f"{MAX_TURNS}"
+        )
+
+
+def check_arc(
+    start: Sequence[int],
+    end: Sequence[int],
+    center: Sequence[int],
+    *,
+    clockwise: bool,
+    turns: int,
+    width: int,
+) -> None:
+    """Refuse just the arcs that a device of ``width`` bits refuses.
+
+    Parameters
+    ----------
+    start, end, center : points of two int
+        In steps.
+    clockwise : bool
+    turns : int
+        The turn in which the arc ends.
+    width : int
+        4 to 32.
+
+    Raises
+    ------
+    BadInputError
+        A coordinate or the number of turns is out of range, the arc has no room, or its end is off
+        the circle of its start.
+    """
+    check_turns(turns)
+    _check_coordinates((start, end, center), width)
+    block = np.array([[*start, *end, *center, clockwise, turns - 1]], dtype=np.int64)
+    refused = refusals(block, width)[0]
+    if refused == RANGE:
+        enough = [w for w in range(width, MAX_WIDTH + 1) if refusals(block, w)[0] != RANGE]
+        raise BadInputError(f"{_no_room(start, end, center, block, width)}; {_give_width(enough)}")
+    if refused == OFF_CURVE:
+        raise BadInputError(_off_circle(start, end, center, *squared_radii(block)[0]))
+
+
+def _no_room(
+    start: Sequence[int], end: Sequence[int], center: Sequence[int], block: np.ndarray, width: int
+) -> str:
+    """Say why an arc has no room."""
+    modulus = 1 << width
+    for name, point in (("start", start), ("end", end)):
+        far = max(abs(a - b) for a, b in zip(point, center, strict=True))
+        if far >= modulus:
+            return (
+                f"the {name} {say_point(point)} is {far} steps from the center {say_point(center)} "
+                f"along an axis: width {width} has room for {modulus - 1}"
+            )
+    limit = int(limits(block)[0])
+    if limit >= modulus:
+        return (
+            f"the arc crosses an axis of its center, up to {limit} steps from it: width {width} "
+            f"has room for {modulus - 1}"
+        )
+    reached, crossed = reaches(block)
+    far = [value for value in reached[crossed].tolist() if not -modulus <= value < modulus]
+    return (
+        f"the arc may reach {far[0]} where it crosses an axis of its center {say_point(center)}: "
+        f"width {width} has room for coordinates from {-modulus} to {modulus - 1}"
+    )
+
+
+def _off_circle(
+    start: Sequence[int], end: Sequence[int], center: Sequence[int], square: int, other: int
+) -> str:
+    """Say how far an end is from the circle of its start; the squares are those of the radii."""
+    if not square:
+        return (
+            f"the start {say_point(start)} is the center and the end {say_point(end)} is not: an "
+            "arc needs a radius; give another center"
+        )
+    # Exact to 36 places, which no two radii need that differ by just more than a step.
+    radius, away = (isqrt(value * 10**80) for value in (square, other))
+    apart = -(-abs(radius - away) // 10**36)  # rounded up: never the 1 that is allowed
+    return (
+        f"the end {say_point(end)} is {_places(away // 10**36)} steps from the center "
+        f"{say_point(center)} and the start {say_point(start)} is {_places(radius // 10**36)}: "
+        f"{_places(apart)} apart, and 1 is allowed; give an end on the start's circle"
+    )
+
+
+def _places(value: int) -> str:
+    """Write ten-thousandths with four places."""
+    return f"{value // 10**4}.{value % 10**4:04d}"
+
+
 def _wider(value: int) -> str:
     """Give the cure for a value that needs more bits."""
-    width = value.bit_length()
-    if width <= MAX_WIDTH:
-        return f"give --width {width}"
-    return f"no device has more than {MAX_WIDTH} bits"
+    return _give_width(range(value.bit_length(), MAX_WIDTH + 1))
+
+
+def _give_width(enough: Sequence[int]) -> str:
+    """Give the cure where these widths, the least of them first, would do."""
+    return f"give --width {enough[0]}" if enough else f"no device has more than {MAX_WIDTH} bits"
 
 
 def read_points(file: str, width: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Runs a path through a method and writes what was asked for: all of ``discreta simulate``."""
+"""Runs a curve through a method and writes what was asked for: all of ``discreta simulate``."""
 
 import csv
 import json
@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 
 from discreta.hdl.contract import AXIS_LETTERS
-from discreta.sim.contour import LineContour
-from discreta.sim.methods import Method
+from discreta.sim.curves import Curve
+from discreta.sim.methods import METHODS, Method
 from discreta.sim.outputs import Outputs
 from discreta.sim.pace import Pace
 from discreta.sim.plot import PathPlot, picture_format
-from discreta.sim.points import BadInputError, check_path
+from discreta.sim.points import BadInputError
 from discreta.sim.simulate import default_engine, simulate
 from discreta.sim.view import write_view
 
-__all__ = ["run_path", "say_choices"]
+__all__ = ["run", "say_choices"]
 
-#: Clocks a block may take beside its summations: acceptance, start, and the last step.
-_OVERHEAD = 4
+#: Clocks of a run beside those of its blocks: up to the first acceptance, and the last answer.
+_OVERHEAD = 2
 
 
-def run_path(
-    points: np.ndarray,
+def run(
+    curve: Curve,
     method: Method,
     *,
     width: int = 16,
@@ -38,13 +38,14 @@ def run_path(
     progress: Callable[[int, int], object] | None = None,
     **choices: Any,
 ) -> dict[str, Any]:
-    """Run a polyline from reset, every step taken at once, and give the summary.
+    """Run a curve from reset, every step taken at once, and give the summary.
 
     Parameters
     ----------
-    points : array of int, shape (points, axes)
-        Support points, in steps; two of them for a line.
+    curve : Curve
+        A :class:`~discreta.sim.curves.Polyline` or an :class:`~discreta.sim.curves.Arc`.
     method : Method
+        One whose blocks are of that kind.
     width : int
         4 to 32.
     engine : str or None
@@ -59,7 +60,7 @@ def run_path(
         Called with the clocks run and the most there can be; the first time when every file has its
         place.
     choices
-        The method's own choices.
+        The method's own choices; of those left out the device has defaults.
 
     Raises
     ------
@@ -70,7 +71,13 @@ def run_path(
     DeadCoreError
         The device does not answer.
     """
-    check_path(points, width)
+    if method.curve != curve.kind:
+        fitting = [name for name, other in METHODS.items() if other.curve == curve.kind]
+        raise BadInputError(
+            f"method {method.name} draws {method.curve}s and no {curve.kind}s: choose "
+            f"{' or '.join(fitting)}"
+        )
+    curve.check(width)
     if vcd is not None and (vcd == "-" or Path(vcd).is_char_device() or Path(vcd).is_fifo()):
         raise BadInputError("--vcd needs a file: its .gtkw view goes beside it")
     if vcd and engine == "compiled":
@@ -83,12 +90,10 @@ def run_path(
         raise BadInputError("--engine compiled needs a C++ compiler: install one or use pysim")
     kind = picture_format(plot) if plot is not None else ""
 
-    axes = points.shape[1]
-    starts, ends = points[:-1], points[1:]
-    golden = method.golden(width, axes, **choices)
-    summations = method.summations(golden, np.abs(ends - starts))
-    limit = int(summations.sum()) + _OVERHEAD * (len(starts) + 1)
-    contour, pace, picture = LineContour(starts, ends), Pace(), PathPlot(points)
+    blocks = curve.blocks
+    golden = method.model(width, curve.axes, **choices)
+    limit = int(method.clocks(golden, blocks).sum()) + _OVERHEAD
+    contour, pace, picture = curve.contour(), Pace(), PathPlot(curve)
     with Outputs(reads) as outputs:
         trace_file = outputs.open(trace) if trace is not None else None
         json_file = outputs.open(summary_file) if summary_file is not None else None
@@ -96,15 +101,14 @@ def run_path(
         vcd_part = outputs.place(vcd) if vcd is not None else None
         view = outputs.open(str(Path(vcd).with_suffix(".gtkw"))) if vcd is not None else None
         vcd_file = outputs.write(vcd_part) if vcd_part else None
-        core = method.device(width, axes, **choices)
+        core = method.core(width, curve.axes, **choices)
         if progress:
             progress(0, limit)
         rows = csv.writer(trace_file, lineterminator="\n") if trace_file else None
         if rows:
-            rows.writerow(["clock", *AXIS_LETTERS[:axes]])
-            rows.writerow([0, *points[0].tolist()])
+            rows.writerow(["clock", *AXIS_LETTERS[: curve.axes]])
+            rows.writerow([0, *curve.start.tolist()])
         clocks = 0
-        blocks = np.concatenate([starts, ends], axis=1)
         stretches = simulate(
             core, blocks, limit=limit, engine=engine, watch=("reg_running",), vcd=vcd_file
         )
@@ -118,6 +122,7 @@ def run_path(
             clocks += stretch.ran
             if progress:
                 progress(clocks, limit)
+        bound = method.bound(golden)
         summary = {
             "method": method.name,
             **core.parameters,
@@ -128,12 +133,9 @@ def run_path(
             "clocks per step": round(contour.clocks / contour.steps, 4) if contour.steps else None,
             "largest error": round(contour.largest_error, 4),
             "largest error at": list(contour.error_at),
-            "error bound": round(method.bound(golden), 4),
-            "segments": len(starts),
-            "support points hit": contour.ends_reached,
-            "path closed": bool(np.array_equal(points[0], points[-1])),
-            "clocks lost between blocks": pace.lost,
-            "end point reached": contour.ends_reached == len(starts),
+            **({} if bound is None else {"error bound": round(bound, 4)}),
+            **curve.facts(contour, pace),
+            "end point reached": contour.ends_reached == len(blocks),
         }
         if vcd and vcd_file and vcd_part and view:
             vcd_file.close()

@@ -7,12 +7,15 @@ from typing import IO
 
 from vcd.gtkw import GTKWFlag, GTKWSave
 
-from discreta.hdl.contract import Part
+from discreta.hdl.contract import AXIS_LETTERS, Part
 
 __all__ = ["write_view"]
 
 #: Where pysim puts the interpolator.
 _CORE = ["bench", "top", "core"]
+
+#: Ends of the names of signed ports: coordinates and steps.
+_AXES = [f"_{letter}" for letter in AXIS_LETTERS]
 
 #: Height of a curve, in rows of GTKWave, and size of its window, in pixels.
 _CURVE_ROWS = 3
@@ -61,7 +64,8 @@ def write_view(view: IO[str], vcd: Path, shown_as: str, core: Part) -> None:
         save.trace(ports["clk"], alias="clk")
         for port in ports:
             if port.split("_")[0] in ("blocks", "steps", "busy", "done", "error"):
-                save.trace(ports[port], alias=port, datafmt="signed")
+                datafmt = "signed" if port[-2:] in _AXES else "dec"
+                save.trace(ports[port], alias=port, datafmt=datafmt)
 
 
 def _variables(vcd: Path) -> Iterator[tuple[list[str], str, str]]:

@@ -14,24 +14,30 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib import metadata
 from itertools import pairwise
+from math import hypot
 from pathlib import Path
 
 import click
 import pytest
 from amaranth import Module, Signal
+from amaranth.hdl import Fragment
 from amaranth.lib import stream
 from amaranth.lib.wiring import In, Out
 
 from discreta import cli
+from discreta.hdl.circular import Circular
 from discreta.hdl.contract import ErrorCode, Part, point_layout, step_layout
 from discreta.hdl.linear import Linear
 from discreta.hdl.quadrant import line_block_layout
 from discreta.hdl.verilog import verilog
 from discreta.sim.methods import METHODS
 from discreta.sim.smt import Verdict
+from tests.arcs import arc_steps
 from tests.lines import distance, path_steps
 
 LINE = ["simulate", "line", "--start", "0,0", "--end", "20,9"]
+ARC = ["simulate", "arc", "--start", "20,0", "--end", "0,20", "--center", "0,0"]
+ARC = [*ARC, "--direction", "ccw"]
 PYSIM = ["--engine", "pysim"]
 BORDER = Path(__file__).parents[1] / "examples/bulgaria.csv"
 
@@ -253,6 +259,142 @@ def test_points_that_come_twice(discreta, points, lost):
     assert summary["end point reached"]
 
 
+# The start and the end of an arc about a centre, and the degrees between them counter-clockwise.
+# None of the ends is off its circle by more than 0.4.
+ANGLES = {
+    "10 degrees": ((30, 9), (28, 14), 10),
+    "a quarter": ((30, 0), (0, 30), 90),
+    "a quarter between the axes": ((24, 18), (-18, 24), 90),
+    "half": ((24, 18), (-24, -18), 180),
+    "three quarters": ((24, 18), (18, -24), 270),
+    "nearly full": ((24, -18), (24, -19), 358),
+    "full": ((24, 18), (24, 18), 360),
+    "full from an axis": ((0, -30), (0, -30), 360),
+    "three turns": ((24, 18), (24, 18), 1080),
+    "two turns and a half": ((24, 18), (-24, -18), 900),
+}
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "degrees", "direction", "right_angles"),
+    [
+        pytest.param(*arc, direction, (index + turned) % 4, id=f"{name} {direction}")
+        for index, (name, arc) in enumerate(ANGLES.items())
+        for direction, turned in (("ccw", 0), ("cw", 2))
+    ],
+)
+def test_arcs(discreta, start, end, degrees, direction, right_angles):
+    """In every quadrant and both directions, every step and every clock from the documents."""
+    center = (-5, 7)
+    if direction == "cw":
+        start, end = ((x, -y) for x, y in (start, end))
+    for _ in range(right_angles):
+        start, end = ((-y, x) for x, y in (start, end))
+    start, end = ((x + center[0], y + center[1]) for x, y in (start, end))
+    turns = -(-degrees // 360)
+    words = [",".join(map(str, point)) for point in (start, end, center)]
+    code, out, err = discreta(
+        *("simulate", "arc", "--start", words[0], "--end", words[1], "--center", words[2]),
+        *("--direction", direction, "--turns", turns, "--width", 6, *PYSIM, "--trace", "-"),
+    )
+    assert code == 0
+    axes, rows = read_trace(out)
+    assert axes == ["x", "y"]
+    assert rows[0] == (0, start)
+    assert rows[-1][1] == end
+    for (clock, (x, y)), (later, (u, v)) in pairwise(rows):
+        assert clock < later
+        assert max(abs(u - x), abs(v - y)) == 1
+    block = (*start, *end, *center, int(direction == "cw"), turns - 1)
+    steps = list(arc_steps(block, width=6))
+    assert rows[1:] == steps
+
+    said = table(err)
+    radius = hypot(start[0] - center[0], start[1] - center[1])
+    errors = [abs(hypot(x - center[0], y - center[1]) - radius) for _, (x, y) in steps]
+    assert said["largest error"] == f"{max(errors):.4f}"
+    assert said["radius"] == f"{radius:.4f}"
+    assert abs(float(said["turn"])) == pytest.approx(degrees, abs=2)
+    assert (float(said["turn"]) < 0) == (direction == "cw")
+    assert said["clocks"] == str(steps[-1][0])
+    assert said["steps"] == str(len(steps))
+    assert said["end point reached"] == "yes"
+
+
+SETTINGS = [
+    ([], {}),
+    (["--setting", "lecture"], Circular.LECTURE),
+    (["--setting", "lecture", "--guard", 3], {**Circular.LECTURE, "guard": 3}),
+    (
+        ["--order", "simultaneous", "--preload", "zero"],
+        {"order": "simultaneous", "preload": "zero"},
+    ),
+    (["--no-normalize", "--guard", 0], {"normalize": False, "guard": 0}),
+    (["--normalize", "--setting", "lecture"], {**Circular.LECTURE, "normalize": True}),
+]
+
+
+@pytest.mark.parametrize(("options", "choices"), SETTINGS)
+def test_settings_of_arcs(discreta, options, choices):
+    """What is given comes before the setting, and the setting before the default."""
+    code, out, err = discreta(*ARC, "--width", 5, *options, *PYSIM, "--trace", "-")
+    assert code == 0
+    steps = list(arc_steps((20, 0, 0, 20, 0, 0, 0, 0), width=5, **choices))
+    assert read_trace(out)[1] == [(0, (20, 0)), *steps]
+    words = {name: "no" if value is False else str(value) for name, value in choices.items()}
+    words = {name: "yes" if value == "True" else value for name, value in words.items()}
+    said = table(err)
+    assert said == said | words
+
+
+def test_a_setting_of_lines(discreta):
+    line = [*LINE, *PYSIM, "--width", "5", "--trace", "-", "--setting", "lecture"]
+    for options, preload in (([], "zero"), (["--preload", "half"], "half")):
+        steps = path_steps([(0, 0), (20, 9)], width=5, normalize=False, preload=preload)
+        assert read_trace(discreta(*line, *options)[1])[1] == [(0, (0, 0)), *steps]
+
+
+def test_help_tells_what_every_choice_is_in_every_setting(discreta):
+    for command in (["simulate", "line"], ["simulate", "arc"], ["verilog"]):
+        said = " ".join(discreta(*command, "--help")[1].split())
+        for method in METHODS.values():
+            for name in method.choices:
+                default, lecture = (method.settings[key][name] for key in ("default", "lecture"))
+                values = (default, lecture)
+                if name == "normalize":
+                    values = ["normalize" if value else "no normalize" for value in values]
+                wanted = rf"--{name}\b[^\]]* \[default: {values[0]}; lecture: {values[1]}\]"
+                assert re.search(wanted, re.sub(r"\[\w+\|\w+\]", "", said))
+
+
+def test_an_arc_of_no_length(discreta, folder):
+    point = ["--start", "5,-5", "--end", "5,-5", "--center", "5,-5", "--direction", "cw"]
+    options = ["--trace", "t.csv", "--plot", "p.svg", "--json", "-", *PYSIM]
+    code, out, _ = discreta("simulate", "arc", *point, *options)
+    assert code == 0
+    assert read_trace((folder / "t.csv").read_text())[1] == [(0, (5, -5))]
+    summary = json.loads(out)
+    assert [summary[name] for name in ("clocks", "steps", "radius", "turn")] == [0] * 4
+    assert summary["clocks per step"] is None
+    assert summary["end point reached"]
+    assert b"<svg" in (folder / "p.svg").read_bytes()
+
+
+@pytest.mark.usefixtures("compiled_engine")
+def test_both_engines_draw_an_arc_the_same(discreta, folder):
+    said = {}
+    for engine in ("pysim", "compiled"):
+        files = ["--trace", f"{engine}.csv", "--plot", f"{engine}.png", "--json", "-"]
+        code, out, _ = discreta(*ARC, "--turns", 2, "--width", 6, "--engine", engine, *files)
+        assert code == 0
+        said[engine] = json.loads(out)
+        assert said[engine].pop("engine") == engine
+    assert said["pysim"] == said["compiled"]
+    for kind in ("csv", "png"):
+        one, other = ((folder / f"{engine}.{kind}").read_bytes() for engine in said)
+        assert one == other
+
+
 # --- what it writes
 
 
@@ -270,6 +412,26 @@ def test_only_data_on_the_standard_output(discreta):
     assert [*summary, "time"] == list(table(err))
     assert err.splitlines()[:-1] == plain.splitlines()[:-1]
     assert all("  " in line and line == line.rstrip() for line in err.splitlines())
+
+
+def test_the_summary_of_an_arc(discreta):
+    code, out, err = discreta(*ARC, *PYSIM, "--json", "-")
+    assert code == 0
+    keys = ["method", "width", "order", "normalize", "preload", "guard", "engine", "clocks"]
+    keys += ["summations", "steps", "clocks per step", "largest error", "largest error at"]
+    keys += ["radius", "turn", "end point reached"]
+    assert list(json.loads(out)) == keys
+    assert list(table(err)) == [*keys, "time"]
+
+
+def test_the_waveform_of_an_arc_shows_every_register(discreta, folder):
+    code, _, _ = discreta(*ARC, "--width", 5, "--vcd", "w.vcd")
+    assert code == 0
+    view = (folder / "w.gtkw").read_text()
+    core = Circular(5)
+    Fragment.get(core, None)  # else Amaranth complains that it is not used
+    assert {f"+{{{name}}}" for name in core.registers} <= set(re.findall(r"^\+\{\w+\}", view, re.M))
+    assert (folder / "w.vcd").stat().st_size > 10_000
 
 
 def test_all_files_at_once(discreta, folder):
@@ -296,6 +458,24 @@ def test_verilog(discreta, folder):
     options = ["--width", "4", "--axes", "3", "--output", "line.v"]
     assert discreta("verilog", "linear", *options) == (0, "", "")
     assert (folder / "line.v").read_text() == out
+
+
+@pytest.mark.parametrize(
+    ("words", "core"),
+    [
+        (["linear", "--setting", "lecture"], lambda: Linear(4, normalize=False, preload="zero")),
+        (["circular"], lambda: Circular(4)),
+        (
+            ["circular", "--axes", "2", "--setting", "lecture", "--guard", "1"],
+            lambda: Circular(4, order="simultaneous", normalize=False, preload="zero", guard=1),
+        ),
+    ],
+)
+def test_verilog_of_a_setting(discreta, words, core):
+    code, out, err = discreta("verilog", *words, "--width", "4")
+    assert (code, err) == (0, "")
+    assert out == verilog(core(), f"discreta_{words[0]}")
+    assert re.findall(r"^module (\w+)", out, re.MULTILINE)[0] == f"discreta_{words[0]}"
 
 
 def test_methods(discreta):
@@ -447,11 +627,11 @@ BAD = {
     # Methods and their options
     "method": (
         [*LINE, "--method", "circle"],
-        "Invalid value for '--method': there is no method 'circle': choose linear",
+        "Invalid value for '--method': there is no method 'circle': choose linear or circular",
     ),
     "prove": (
         ["prove", "linear", "circle"],
-        "Invalid value for 'METHOD...': there is no method 'circle': choose linear",
+        "Invalid value for 'METHOD...': there is no method 'circle': choose linear or circular",
     ),
     "width 3": ([*LINE, "--width", "3"], f"Invalid value for '--width': width is 3: {WIDTH}"),
     "width 33": ([*LINE, "--width", "33"], f"Invalid value for '--width': width is 33: {WIDTH}"),
@@ -463,6 +643,92 @@ BAD = {
     "axes": (
         ["verilog", "linear", "--axes", "7"],
         "Invalid value for '--axes': number of axes is 7: choose a whole number from 2 to 6",
+    ),
+    "axes of arcs": (
+        ["verilog", "circular", "--axes", "3"],
+        "--axes 3: circular has 2 axes: leave it out",
+    ),
+    "arcs with a method for lines": (
+        [*ARC, "--method", "linear"],
+        "method linear draws lines and no arcs: choose circular",
+    ),
+    "lines with a method for arcs": (
+        [*LINE, "--method", "circular"],
+        "method circular draws arcs and no lines: choose linear",
+    ),
+    "a path with a method for arcs": (
+        [*PATH_OF, "good.csv", "--method", "circular"],
+        "method circular draws arcs and no lines: choose linear",
+    ),
+    "setting": (
+        [*LINE, "--setting", "book"],
+        "--setting book: choose default or lecture for linear",
+    ),
+    "setting of Verilog": (
+        ["verilog", "circular", "--setting", ""],
+        "--setting : choose default or lecture for circular",
+    ),
+    "order of lines": (
+        [*LINE, "--order", "alternated"],
+        "--order is no option of linear, which has --normalize and --preload: leave it out",
+    ),
+    "guard of lines": (
+        ["verilog", "linear", "--guard", "0"],
+        "--guard is no option of linear, which has --normalize and --preload: leave it out",
+    ),
+    "guard": (
+        [*ARC, "--guard", "5"],
+        "Invalid value for '--guard': number of guard bits is 5: choose a whole number from 0 to 4",
+    ),
+    "guard x": (
+        [*ARC, "--guard", "-"],
+        "Invalid value for '--guard': number of guard bits is '-': choose a whole number from 0 to "
+        "4",
+    ),
+    # Arcs
+    "arc in three axes": (
+        [*ARC, "--center", "0,0,0"],
+        "Invalid value for '--center': '0,0,0' is not a point: give 2 whole numbers of steps with "
+        "commas between, like 200,99",
+    ),
+    "no turns": (
+        [*ARC, "--turns", "0"],
+        "Invalid value for '--turns': number of turns is 0: choose a whole number from 1 to 256",
+    ),
+    "too many turns": (
+        [*ARC, "--turns", "257"],
+        "Invalid value for '--turns': number of turns is 257: choose a whole number from 1 to 256",
+    ),
+    "half a turn": (
+        [*ARC, "--turns", "0.5"],
+        "Invalid value for '--turns': number of turns is '0.5': choose a whole number from 1 to "
+        "256",
+    ),
+    "arc too far": ([*ARC, "--center", "0,-70000"], f"coordinate -70000 {ROOM} 17"),
+    "arc far from its center": (
+        [*ARC, "--start", "60000,0", "--center", "-6000,0"],
+        "the start 60000,0 is 66000 steps from the center -6000,0 along an axis: width 16 has room "
+        "for 65535; give --width 17",
+    ),
+    "arc out of the coordinates": (
+        [*ARC, "--start", "0,65530", "--end", "-40,65530", "--center", "-20,65510"],
+        "the arc may reach 65539 where it crosses an axis of its center -20,65510: width 16 has "
+        "room for coordinates from -65536 to 65535; give --width 17",
+    ),
+    "arc too large to cross an axis": (
+        [*ARC, "--start", "65535,0", "--end", "0,-65535"],
+        "the arc crosses an axis of its center, up to 65536 steps from it: width 16 has room for "
+        "65535; give --width 17",
+    ),
+    "end off the circle": (
+        [*ARC, "--end", "0,22"],
+        "the end 0,22 is 22.0000 steps from the center 0,0 and the start 20,0 is 20.0000: 2.0000 "
+        "apart, and 1 is allowed; give an end on the start's circle",
+    ),
+    "no radius": (
+        [*ARC, "--center", "20,0"],
+        "the start 20,0 is the center and the end 0,20 is not: an arc needs a radius; give another "
+        "center",
     ),
     # Points
     "one axis": (
@@ -602,6 +868,10 @@ USAGE = {
     "no method": (["verilog"], "'METHOD'", "discreta verilog --help"),
     "no value": ([*LINE, "--json"], "'--json'", "requires an argument"),
     "preload": ([*LINE, "--preload", "full"], "'full'", "'zero', 'half'"),
+    "order": ([*ARC, "--order", "first"], "'first'", "'alternated', 'simultaneous'"),
+    "direction": ([*ARC, "--direction", "left"], "'left'", "'ccw', 'cw'"),
+    "no direction": (ARC[:-2], "'--direction'", "discreta simulate arc --help"),
+    "no center": (ARC[:-4], "'--center'", "discreta simulate arc --help"),
     "engine": ([*LINE, "--engine", "fast"], "'fast'", "'pysim', 'compiled'"),
 }
 
@@ -645,7 +915,8 @@ def test_every_help_has_an_example_that_parses(discreta, path):
     assert (code, err) == (0, "")
     assert discreta(*path[1:], "-h") == (0, out, "")
     assert "..." not in out.replace("[ARGS]...", "").replace("METHOD...", "")
-    (example,) = re.findall(r"^ +Example: (.*)$", out, flags=re.MULTILINE)
+    (example,) = re.findall(r"^ +Example: ((?:.*\\\n)*.*)$", out, flags=re.MULTILINE)
+    example = example.replace("\\\n", "")
     assert max(map(len, out.splitlines())) <= 80
     words = shlex.split(example)
     assert tuple(words[: len(path)]) == path

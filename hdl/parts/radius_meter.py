@@ -82,7 +82,7 @@ class RadiusMeter(Part):
             self.measured.eq(tick == 2 * n + 4),
             self.busy.eq(tick != 0),
         ]
-        squaring, drawing = Signal(), Signal()
+        squaring, drawing = Signal(name="squaring"), Signal(name="drawing")
         m.d.comb += [
             squaring.eq((tick != 0) & (tick <= n)),
             drawing.eq((tick >= n + 2) & (tick <= 2 * n + 3)),

@@ -348,7 +348,8 @@ class Circular:
         on_curve = negate(less(r, d - 1)) & negate(less(d, 1 - r)) & negate(centred)
         empty = centred & equal(d, 0)
         off = where(on_curve | empty, 0, OFF_CURVE)
-        fault = where(self._leaves(state), RANGE, where(state["fault"], state["fault"], off))
+        leaves = self._leaves(state) & negate(empty)
+        fault = where(leaves, RANGE, where(state["fault"], state["fault"], off))
         after["fault"] = where(measured, fault, state["fault"])
         after["empty"] = where(measured, empty, state["empty"])
         after["tick"] = where(measured, 0, (tick + negate(equal(tick, 0)))) & (

@@ -2,8 +2,11 @@ import math
 
 import numpy as np
 import pytest
+from amaranth.hdl import Fragment
 
+from discreta.sim.contour import ArcContour, LineContour
 from discreta.sim.methods import METHODS
+from discreta.sim.simulate import simulate
 
 LINEAR = METHODS["linear"]
 
@@ -22,17 +25,80 @@ def test_no_point_of_the_fractions_is_farther_than_the_bound(axes):
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     corners = random.integers(0, 2, directions.shape)
     for preload, fractions in (("zero", corners), ("half", corners - 0.5)):
-        bound = LINEAR.bound(LINEAR.golden(8, axes, preload=preload))
+        bound = LINEAR.bound(LINEAR.model(8, axes, preload=preload))
+        assert bound is not None
         along = np.sum(fractions * directions, axis=1, keepdims=True)
         off = np.linalg.norm(fractions - along * directions, axis=1)
         assert off.max() <= bound
         assert off.max() > 0.9 * bound
-    assert math.isclose(LINEAR.bound(LINEAR.golden(8, 2, preload="half")), math.sqrt(1 / 2))
+    bound = LINEAR.bound(LINEAR.model(8, preload="half"))
+    assert bound == pytest.approx(math.sqrt(1 / 2))
 
 
-def test_summations_are_the_power_of_two_above_the_longest_axis():
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_settings_give_every_choice_a_value_that_is_surveyed(method):
+    assert method.settings.keys() == {"default", "lecture"}
+    for setting in method.settings.values():
+        assert setting.keys() == method.choices.keys()
+        assert all(value in method.choices[name] for name, value in setting.items())
+    # What a device is without a word is the default setting.
+    core, model = method.core(8), method.model(8)
+    for made in (core.parameters, vars(model)):
+        assert made == made | method.settings["default"]
+    Fragment.get(core, None)  # else Amaranth complains that it is not used
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_numbers_of_axes(method):
+    for axes in method.axes:
+        core = method.core(8, axes)
+        Fragment.get(core, None)
+        assert len(core.position.shape().members) == axes
+
+
+def blocks_of_lines(count, width):
+    """Draw lines, short ones too."""
+    random = np.random.default_rng(1)
+    start = random.integers(-(2**width), 0, (count, 2))
+    length = random.integers(0, 2 ** random.integers(0, width + 1, (count, 1)), (count, 2))
+    return np.hstack([start, start + length])
+
+
+def blocks_of_arcs(count, width):
+    """Draw arcs about the origin, small ones too, some of several turns."""
+    random = np.random.default_rng(2)
+    start = random.integers(0, 2 ** random.integers(1, width, (count, 1)), (count, 2))
+    end = np.where(random.random((count, 1)) < 0.5, start[:, ::-1], start)
+    end = end * random.choice([-1, 1], (count, 2))
+    direction, turns = random.integers(0, 2, count), random.choice([0, 0, 1, 3], count)
+    return np.column_stack([start, end, 0 * start, direction, turns])
+
+
+@pytest.mark.usefixtures("compiled_engine")
+@pytest.mark.parametrize("setting", ["default", "lecture"])
+@pytest.mark.parametrize(
+    ("name", "blocks"),
+    [("linear", blocks_of_lines(100, 6)), ("circular", blocks_of_arcs(60, 6))],
+)
+def test_no_block_takes_more_clocks_than_it_may(name, blocks, setting):
+    """And the limit is no more than a few times too high: a dead core is soon given up."""
+    method = METHODS[name]
+    choices = method.settings[setting]
+    most = method.clocks(method.model(6, **choices), blocks)
+    contour = (LineContour if method.curve == "line" else ArcContour)(blocks)
+    core = method.core(6, **choices)
+    for stretch in simulate(core, blocks, limit=int(most.sum()), engine="compiled"):
+        contour.follow(stretch)
+    # Back to back a block begins, at the earliest, with the last step of the one before.
+    assert np.all(contour.block_clocks <= most)
+    assert contour.block_clocks.sum() > most.sum() / 8
+    assert contour.reached.all()
+
+
+def test_clocks_of_lines_are_the_power_of_two_above_the_longest_axis():
     lengths = np.array([[0, 0], [1, 0], [5, 3], [8, 7], [255, 1]])
-    normalized = LINEAR.summations(LINEAR.golden(8, 2, normalize=True), lengths)
-    assert normalized.tolist() == [0, 2, 8, 16, 256]
-    plain = LINEAR.summations(LINEAR.golden(8, 2, normalize=False), lengths)
-    assert plain.tolist() == [0, 256, 256, 256, 256]
+    blocks = np.hstack([np.ones_like(lengths), 1 - lengths])
+    normalized = LINEAR.clocks(LINEAR.model(8, normalize=True), blocks)
+    assert (normalized - normalized[0]).tolist() == [0, 2, 8, 16, 256]
+    plain = LINEAR.clocks(LINEAR.model(8, normalize=False), blocks)
+    assert (plain - plain[0]).tolist() == [0, 256, 256, 256, 256]

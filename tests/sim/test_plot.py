@@ -6,6 +6,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from discreta.sim.curves import Arc, Polyline
 from discreta.sim.plot import PathPlot, picture_format
 from discreta.sim.points import BadInputError
 from tests.lines import distance, line_steps
@@ -24,8 +25,8 @@ def steps_of(corners):
     return np.array(points).reshape(-1, corners.shape[1]), np.array(errors)
 
 
-def picture(tmp_path, corners, points, errors, *, cuts=(), kind=".svg"):
-    plot = PathPlot(corners)
+def picture(tmp_path, curve, points, errors, *, cuts=(), kind=".svg"):
+    plot = PathPlot(curve if isinstance(curve, Arc) else Polyline(curve))
     for part, error in zip(np.split(points, cuts), np.split(errors, cuts), strict=True):
         plot.follow(part, error)
     path = tmp_path / f"picture{kind}"
@@ -91,7 +92,7 @@ def test_the_window_stands_at_the_largest_error(tmp_path):
     points, errors = steps_of(CORNERS)
     svg = picture(tmp_path, CORNERS, points, errors)
     worst = int(np.argmax(errors))
-    near = np.vstack([CORNERS[:1], points])[max(0, worst + 1 - 12) : worst + 1 + 13]
+    near = np.vstack([CORNERS[:1], points])[max(0, worst + 1 - 28) : worst + 1 + 29]
     seen = markers(svg, "near")
     assert scale(seen, near)(seen) == pytest.approx(near, abs=1e-3)
     assert f"largest error: {errors[worst]:.4f} step" in texts(svg)
@@ -156,6 +157,63 @@ def test_paths_of_no_steps_or_one(tmp_path, corners):
     svg = picture(tmp_path, corners, *steps_of(corners))
     moves = bool(np.any(corners[0] != corners[-1]))
     assert any("largest error" in (text or "") for text in texts(svg)) == moves
+
+
+def round_steps(radius, center, angles):
+    """Give rounded points of a circle, and their errors."""
+    exact = np.stack([radius * np.cos(angles), radius * np.sin(angles)], axis=1)
+    points = np.rint(exact).astype(int)
+    return points + center, np.abs(np.hypot(*points.T) - radius)
+
+
+@pytest.mark.parametrize("turns", [1, 3])
+def test_an_arc(tmp_path, turns):
+    """The true path is the circle, however many turns; the staircase is the trace."""
+    arc = Arc((65, 4), (65, 4), (5, 4), clockwise=False, turns=turns)
+    angles = np.linspace(0, 2 * np.pi * turns, 480 * turns + 1)[1:]
+    svg = picture(tmp_path, arc, *round_steps(60, (5, 4), angles))
+    curves = {name: vertices(svg, name) for name in ("steps", "true")}
+    # Lines are simplified, but not at the outermost points.
+    low, high = curves["steps"].min(axis=0), curves["steps"].max(axis=0)
+    steps, true = (
+        (curve - low) / (high - low) * 120 + (5 - 60, 4 - 60) for curve in curves.values()
+    )
+    for curve in (steps, true):
+        assert curve[[0, -1]] == pytest.approx(np.array([[65, 4], [65, 4]]), abs=0.01)
+    assert np.abs(np.hypot(*(steps - (5, 4)).T) - 60).max() < 0.8
+    assert np.hypot(*(true - (5, 4)).T) == pytest.approx(60, abs=0.05)
+    assert len(true) > 100
+
+
+def test_the_window_shows_a_small_circle(tmp_path):
+    arc = Arc((4, 3), (-3, 4), (0, 0), clockwise=False)
+    points, errors = round_steps(5, (0, 0), np.arctan2(3, 4) + np.arange(1, 8) / 5)
+    svg = picture(tmp_path, arc, points, errors)
+    in_steps = scale(markers(svg, "near"), np.vstack([[4, 3], points]))
+    true = in_steps(vertices(svg, "true-near"))
+    assert np.hypot(*true.T) == pytest.approx(5, abs=0.02)
+    assert true[[0, -1]] == pytest.approx(np.array([[4, 3], [-3, 4]]), abs=0.02)
+
+
+@pytest.mark.parametrize("radius", [10**6, 4 * 10**9])
+def test_the_window_shows_a_large_circle(tmp_path, radius):
+    """At the largest error it is as far off as that says, not as the outline's chord is."""
+    x, y = start = 4 * radius // 5, 3 * radius // 5
+    arc = Arc(start, (-y, x), (0, 0), clockwise=False)
+    angle = np.arctan2(y, x) + np.pi / 4096  # in the middle of a chord
+    points, errors = round_steps(radius, (0, 0), angle + np.arange(-3, 4) / radius)
+    worst = int(np.argmax(errors))
+    svg = picture(tmp_path, arc, points, errors)
+    in_steps = scale(markers(svg, "near")[-len(points) :], points)  # the start is far away
+    true = in_steps(vertices(svg, "true-near"))
+    assert np.hypot(*true.T) == pytest.approx(radius, abs=0.02)
+    (x, y), (u, v) = true[0] - points[worst], true[-1] - points[worst]
+    assert min(np.hypot(x, y), np.hypot(u, v)) > 7  # out of the window at both ends
+    assert abs(x * v - y * u) / np.hypot(u - x, v - y) == pytest.approx(errors[worst], abs=0.03)
+    # Long numbers are written out.
+    tens = [str(value)[:-1] for value in points[worst]]
+    written = [re.sub(r"\D", "", text or "") for text in texts(svg)]
+    assert all(any(text.startswith(number) for text in written) for number in tens)
 
 
 def test_names_of_pictures():

@@ -6,7 +6,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from discreta.sim.points import BadInputError, check_line, check_path, parse_point, read_points
+from discreta.sim.arcs import RANGE, refusals
+from discreta.sim.points import (
+    BadInputError,
+    check_arc,
+    check_line,
+    check_path,
+    parse_point,
+    read_points,
+)
 
 
 def fails_with(message):
@@ -62,6 +70,152 @@ def test_a_path_is_refused_for_its_first_bad_line():
         "coordinate 256 is out of range: width 8 has room for -256 to 255; give --width 9"
     ):
         check_path(np.array([[256, 0], [0, 0]]), 8)
+
+
+SEEN = "steps from the center"
+COORDINATES = "width 8 has room for coordinates from -256 to 255"
+# start, end, center, clockwise, turns, width; the complaint
+ARCS = {
+    "a quarter": ((100, 0), (0, 100), (0, 0), False, 1, 8, ""),
+    "the longest quarter": ((255, 0), (0, 255), (0, 0), False, 1, 8, ""),
+    "most turns": ((100, 0), (100, 0), (0, 0), True, 256, 8, ""),
+    "no length": ((7, 7), (7, 7), (7, 7), False, 256, 8, ""),
+    "no turn": (
+        *((100, 0), (100, 0), (0, 0), True, 0, 8),
+        "number of turns is 0: choose a whole number from 1 to 256",
+    ),
+    "too many turns": (
+        *((100, 0), (100, 0), (0, 0), True, 257, 8),
+        "number of turns is 257: choose a whole number from 1 to 256",
+    ),
+    "coordinate": (
+        *((300, 0), (0, 300), (0, 0), False, 1, 8),
+        "coordinate 300 is out of range: width 8 has room for -256 to 255; give --width 9",
+    ),
+    "the lowest coordinate of a width": (
+        *((0, 0), (0, -512), (0, -256), False, 1, 8),
+        "coordinate -512 is out of range: width 8 has room for -256 to 255; give --width 9",
+    ),
+    "coordinate of the center": (
+        *((10, 0), (0, 10), (0, -(10**60)), False, 1, 32),
+        f"coordinate -1{'0' * 38}… is out of range: width 32 has room for -4294967296 to "
+        "4294967295; no device has more than 32 bits",
+    ),
+    "start seen from the center": (
+        *((200, 0), (-100, 9), (-100, 0), False, 1, 8),
+        f"the start 200,0 is 300 {SEEN} -100,0 along an axis: width 8 has room for 255; give "
+        "--width 9",
+    ),
+    "and the widest device": (
+        *((2**31 - 1, 0), (0, 9), (-10, 0), False, 1, 31),
+        f"the start 2147483647,0 is 2147483657 {SEEN} -10,0 along an axis: width 31 has room for "
+        "2147483647; give --width 32",
+    ),
+    "end seen from the center": (
+        *((5, -5), (6, -256), (0, 0), False, 1, 8),
+        f"the end 6,-256 is 256 {SEEN} 0,0 along an axis: width 8 has room for 255; give --width 9",
+    ),
+    "a radius too large to cross an axis": (
+        *((0, 255), (255, 0), (0, 0), False, 1, 8),
+        "the arc crosses an axis of its center, up to 256 steps from it: width 8 has room for 255; "
+        "give --width 9",
+    ),
+    "and for any device": (
+        *((0, 2**32 - 1), (2**32 - 1, 0), (0, 0), False, 1, 32),
+        "the arc crosses an axis of its center, up to 4294967296 steps from it: width 32 has room "
+        "for 4294967295; no device has more than 32 bits",
+    ),
+    "just inside on the right": ((250, -9), (250, 9), (242, 0), False, 1, 8, ""),
+    "out on the right": (
+        *((251, -10), (251, 10), (242, 0), False, 1, 8),
+        f"the arc may reach 256 where it crosses an axis of its center 242,0: {COORDINATES}; give "
+        "--width 9",
+    ),
+    "the other way": ((251, -10), (251, 10), (242, 0), True, 1, 8, ""),
+    "the other way, and a turn more": (
+        *((251, -10), (251, 10), (242, 0), True, 2, 8),
+        f"the arc may reach 256 where it crosses an axis of its center 242,0: {COORDINATES}; give "
+        "--width 9",
+    ),
+    "just inside below": ((-10, -251), (10, -251), (0, -242), False, 1, 8, ""),
+    "out below": (
+        *((-10, -252), (10, -252), (0, -243), False, 1, 8),
+        f"the arc may reach -257 where it crosses an axis of its center 0,-243: {COORDINATES}; "
+        "give --width 9",
+    ),
+    "off the circle": (
+        *((100, 0), (0, 103), (0, 0), False, 1, 8),
+        f"the end 0,103 is 103.0000 {SEEN} 0,0 and the start 100,0 is 100.0000: 3.0000 apart, and "
+        "1 is allowed; give an end on the start's circle",
+    ),
+    "within it": (
+        *((5, 113), (5, 108), (5, 5), True, 1, 8),
+        f"the end 5,108 is 103.0000 {SEEN} 5,5 and the start 5,113 is 108.0000: 5.0000 apart, and "
+        "1 is allowed; give an end on the start's circle",
+    ),
+    "by hardly more than a step": (
+        *((2**31, 0), (1, 2**31 + 1), (0, 0), False, 1, 32),
+        f"the end 1,2147483649 is 2147483649.0000 {SEEN} 0,0 and the start 2147483648,0 is "
+        "2147483648.0000: 1.0001 apart, and 1 is allowed; give an end on the start's circle",
+    ),
+    "by a step": ((2**31, 0), (0, 2**31 + 1), (0, 0), False, 1, 32, ""),
+    "from the center": (
+        *((5, 5), (5, 6), (5, 5), False, 1, 8),
+        "the start 5,5 is the center and the end 5,6 is not: an arc needs a radius; give another "
+        "center",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", ARCS.values(), ids=ARCS)
+def test_arcs(case):
+    *points, clockwise, turns, width, complaint = case
+    with fails_with(complaint) if complaint else nullcontext():
+        check_arc(*points, clockwise=clockwise, turns=turns, width=width)
+
+
+@st.composite
+def arcs(draw):
+    """Draw arcs of any width, most of them nearly on a circle; some without room."""
+    width = draw(st.integers(4, 32))
+    coordinate = st.integers(-(2**width) - 2, 2**width + 1)
+    start, center = (draw(st.tuples(coordinate, coordinate)) for _ in range(2))
+    x, y = (a - b for a, b in zip(start, center, strict=True))
+    seen = draw(st.sampled_from([(x, y), (y, x), (-x, y), (-y, -x)]))
+    off = draw(st.tuples(st.integers(-1, 1), st.integers(-1, 1)))
+    end = tuple(a + b + c for a, b, c in zip(center, seen, off, strict=True))
+    return start, end, center, draw(st.booleans()), draw(st.integers(1, 256)), width
+
+
+@settings(derandomize=True, database=None, max_examples=400)
+@given(arcs())
+def test_an_arc_is_refused_just_when_the_device_refuses_it(case):
+    start, end, center, clockwise, turns, width = case
+
+    def complaint_at(width):
+        try:
+            check_arc(start, end, center, clockwise=clockwise, turns=turns, width=width)
+        except BadInputError as error:
+            return str(error)
+        return ""
+
+    complaint = complaint_at(width)
+    if any(not -(2**width) <= value < 2**width for value in (*start, *end, *center)):
+        assert complaint.startswith("coordinate ")
+        return
+    blocks = np.array([[*start, *end, *center, clockwise, turns - 1]])
+    code = refusals(blocks, width)[0]
+    assert (complaint == "") == (code == 0)
+    # The width that it names is the least that has room for the arc.
+    if cure := re.search(r"; give --width (\d+)$", complaint):
+        enough = int(cure[1])
+        assert code == RANGE
+        assert width < enough <= 32
+        assert "width" not in complaint_at(enough)
+        assert complaint_at(enough - 1).endswith(cure[0])
+    elif code == RANGE:
+        assert complaint.endswith("; no device has more than 32 bits")
+        assert "width 32 has room" in complaint_at(32)
 
 
 GOOD = {
