@@ -1,16 +1,31 @@
-"""Proves one variant of a method; a process of its own for each uses all cores."""
+"""Proves a method part by part; a process of its own for each uses all cores."""
 
+from importlib import import_module
 from typing import Any
 
 from discreta.sim.methods import METHODS
 from discreta.sim.smt import Verdict, check, equivalence
 
-__all__ = ["prove_variant"]
+__all__ = ["parts", "prove_variant"]
 
 
-def prove_variant(name: str, width: int, variant: dict[str, Any]) -> list[Verdict]:
-    """Prove RTL = golden and the promises of one variant, in the plane."""
+def parts(name: str) -> list[dict[str, Any] | None]:
+    """Give every variant of a method, and before them None if there is something they share."""
+    shares = hasattr(import_module(f"discreta.sim.proofs.{name}"), "shared")
+    return [*([None] if shares else []), *METHODS[name].variants()]
+
+
+def prove_variant(name: str, width: int, variant: dict[str, Any] | None) -> list[Verdict]:
+    """Prove RTL = golden and the promises of one variant, in the plane.
+
+    With None prove what is promised of all variants alike.
+    """
     method = METHODS[name]
-    golden = method.golden(width, 2, **variant)
-    obligations = equivalence(method.device(width, 2, **variant), golden)
-    return [check(obligation) for obligation in obligations + method.promises(golden)]
+    if variant is None:
+        golden = method.model(width, **method.settings["default"])
+        obligations = import_module(f"discreta.sim.proofs.{name}").shared(golden)
+    else:
+        golden = method.model(width, **variant)
+        obligations = equivalence(method.core(width, **variant), golden)
+        obligations += method.promises(golden)
+    return [check(obligation) for obligation in obligations]

@@ -8,8 +8,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,14 @@ from discreta.hdl.contract import Part
 from discreta.hdl.plain import PlainPorts
 
 __all__ = [
+    "Exhaustive",
     "Obligation",
     "Rtl",
     "Verdict",
     "check",
     "equivalence",
     "extend",
+    "numbers",
     "same",
     "symbols",
 ]
@@ -47,17 +49,36 @@ class Obligation:
         They are proven one by one; in a dict by the names of what they speak of.
     arithmetic : bool
         It speaks of unbounded numbers, not of bit-vectors.
+    ranges : list of z3.BoolRef
+        Which numbers its symbols can be, if these are signed: assumed as well.
     """
 
     title: str
     assumptions: list
     claims: list | dict[str, z3.BoolRef]
     arithmetic: bool = False
+    ranges: list = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Exhaustive:
+    """Something to check in every case there is, where a proof does not reach.
+
+    Attributes
+    ----------
+    title : str
+        What a reader learns when it holds, and what the cases are, in one line.
+    search : callable
+        Gives the values of a case that breaks it, or "" when there is none.
+    """
+
+    title: str
+    search: Callable[[], str]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """How the proof of an obligation ended.
+    """How the proof of an obligation, or the check of every case, ended.
 
     Attributes
     ----------
@@ -66,27 +87,35 @@ class Verdict:
     seconds : float
     counterexample : str
         Empty when it holds; else the values that break it, or that the solver gave up.
+    exhaustive : bool
+        Every case was checked; otherwise it was proven.
     """
 
     title: str
     holds: bool
     seconds: float
     counterexample: str
+    exhaustive: bool = False
 
 
-def check(obligation: Obligation) -> Verdict:
-    """Prove an obligation or find values that break it."""
+def check(obligation: Obligation | Exhaustive) -> Verdict:
+    """Prove an obligation, or check every case of it, or find values that break it."""
     began = time.perf_counter()
-    counterexample = ""
+    exhaustive = isinstance(obligation, Exhaustive)
+    counterexample = obligation.search() if exhaustive else _counterexample(obligation)
+    seconds = time.perf_counter() - began
+    return Verdict(obligation.title, not counterexample, seconds, counterexample, exhaustive)
+
+
+def _counterexample(obligation: Obligation) -> str:
+    """Find values that break one of the claims; empty when there are none."""
     claims = obligation.claims
     if isinstance(claims, list):
         claims = {f"claim {number}": claim for number, claim in enumerate(claims, start=1)}
     for name, claim in claims.items():
         if broken := _break(obligation, claim):
-            counterexample = f"{name}: {broken}"
-            break
-    seconds = time.perf_counter() - began
-    return Verdict(obligation.title, not counterexample, seconds, counterexample)
+            return f"{name}: {broken}"
+    return ""
 
 
 def _break(obligation: Obligation, claim: z3.BoolRef) -> str:
@@ -95,25 +124,44 @@ def _break(obligation: Obligation, claim: z3.BoolRef) -> str:
     # proves, but it finds no values where Yosys's own functions are left; the default does.
     bits = z3.Then("simplify", "propagate-values", "solve-eqs", "bit-blast", "aig", "sat")
     solvers = [z3.Solver()] if obligation.arithmetic else [bits.solver(), z3.Solver()]
+    # One formula: adding many one by one takes longer than many a proof.
+    asked = z3.And(*obligation.ranges, *obligation.assumptions, z3.Not(claim))
     for solver in solvers:
         solver.set("timeout", TIMEOUT)
-        solver.add(*obligation.assumptions, z3.Not(claim))
+        solver.add(asked)
         answer = solver.check()
         if answer == z3.unsat:
             return ""
         if answer == z3.sat:
-            return _values(solver.model())
+            return _values(solver.model(), obligation, claim)
     return f"the solver gave up: {solvers[-1].reason_unknown()}"
 
 
-def _values(model: z3.ModelRef) -> str:
+def _values(model: z3.ModelRef, obligation: Obligation, claim: z3.BoolRef) -> str:
+    """Write down the values of a model; of ranged symbols only those that the claim is about."""
+    signed = bool(obligation.ranges)
+    named = _names(*obligation.assumptions, claim) if signed else None
     values = sorted(
-        f"{symbol.name()}={value}"
+        f"{symbol.name()}={value.as_signed_long() if signed else value}"
         for symbol in model.decls()
         if symbol.arity() == 0
+        and (named is None or symbol.name() in named)
         and isinstance(value := model[symbol], z3.BitVecNumRef | z3.IntNumRef | z3.RatNumRef)
     )
     return ", ".join(values) or "(no values)"
+
+
+def _names(*formulas: z3.ExprRef) -> set[str]:
+    """Name the symbols that occur in formulas."""
+    names, seen, left = set(), set(), list(formulas)
+    while left:
+        formula = left.pop()
+        if formula.get_id() not in seen:
+            seen.add(formula.get_id())
+            left += formula.children()
+            if z3.is_const(formula):
+                names.add(formula.decl().name())
+    return names
 
 
 def extend(value: z3.BitVecRef, signed: bool, width: int) -> z3.BitVecRef:
@@ -128,6 +176,22 @@ def symbols(kinds: dict[str, tuple[int, bool]], width: int, suffix: str = "") ->
         name: extend(z3.BitVec(name + suffix, bits), signed, width)
         for name, (bits, signed) in kinds.items()
     }
+
+
+def numbers(
+    kinds: dict[str, tuple[int, bool]], width: int, prefix: str = ""
+) -> tuple[dict, list[z3.BoolRef]]:
+    """Make a signed symbol of ``width`` bits for every (width, signed) kind, and state its range.
+
+    The solver can solve an equation for such a symbol, as it cannot for a narrow one that was
+    extended: sums of many terms are proven equal in no time.
+    """
+    values, ranges = {}, []
+    for name, (bits, signed) in kinds.items():
+        value = values[name] = z3.BitVec(prefix + name, width)
+        low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1)) if signed else (0, 2**bits)
+        ranges += [value >= low, value < high]
+    return values, ranges
 
 
 class Rtl:
@@ -231,7 +295,7 @@ def equivalence(core: Part, golden: Any) -> list[Obligation]:
     """
     rtl = Rtl(core)
     named = sum(bits for bits, _ in rtl.registers.values())
-    width = max(bits for bits, _ in rtl.inputs.values()) + 4
+    width = max(bits for bits, _ in (rtl.inputs | rtl.registers).values()) + 4
     state, inputs = symbols(rtl.registers, width), symbols(rtl.inputs, width)
     outputs = {
         name: extend(z3.BitVec(f"out.{name}", bits), signed, width)

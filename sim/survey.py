@@ -1,237 +1,389 @@
-"""Runs every line of a width through the compiled RTL and judges every register at every clock."""
+"""Runs blocks by the thousand through the compiled RTL and judges every step and every register.
+
+A survey has groups of blocks and runs each of them through every variant of the method, block
+behind block. Every block is judged by its steps. The registers are compared with the golden model
+at every clock, for all blocks or a sample of them: from the registers of a clock, as the RTL has
+them, the golden model works out those of the next, thousands of clocks at a time.
+"""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
-from functools import lru_cache
 from itertools import repeat
-from typing import Any
+from math import pi, sqrt
+from typing import Any, Protocol
 
 import numpy as np
 
+from discreta.sim.arcs import seen_from_center
 from discreta.sim.compiled import CompiledModel
-from discreta.sim.contour import distance_from_line
+from discreta.sim.contour import ArcContour, Contour, LineContour
+from discreta.sim.groups import SEED, Group
 from discreta.sim.methods import METHODS, Method
+from discreta.sim.points import say_point
+from discreta.sim.simulate import DeadCoreError, simulate
+from discreta.sim.stretch import EVENT_COLUMNS, Stretch
 
-__all__ = ["CLOCK_BUDGET", "SEED", "SurveyRow", "survey", "survey_lines"]
+__all__ = ["REGISTER_BUDGET", "SurveyRow", "say_worst", "survey"]
 
-SEED = 1970
+#: Clocks in which a survey compares registers, shared evenly by its variants and groups.
+REGISTER_BUDGET = 1 << 27
 
-#: Clocks that the sample of a width may take for one variant; a width beyond has no survey.
-CLOCK_BUDGET = 1 << 25
+#: Clocks of a part of a survey, and clocks that the golden model works out at a time.
+_PART, _BATCH = 1 << 24, 1 << 13
 
-#: Lines that run side by side, and lines times clocks between two comparisons.
-_BATCH, _WINDOW = 1024, 1 << 16
-
-#: Clocks around the summations: acceptance, start, and the last step, which leaves a clock later.
-_OVERHEAD = 4
+#: Clocks of a run beside those of its blocks: up to the first acceptance, and the last answer.
+_OVERHEAD = 2
 
 
 @dataclass
 class SurveyRow:
-    """What a survey found for one variant of a method.
+    """What a survey found for one variant of a method and one group of blocks.
 
     Attributes
     ----------
     variant : dict
         The method's choices.
-    lines, clocks : int
-        Lines run, and clocks of RTL compared.
+    group : int
+        The group's number, from 0.
+    blocks, compared : int
+        Blocks run, and those of them during which the registers were compared.
+    clocks : int
+        Clocks of RTL.
     largest_error : float
-        Largest distance of a point from its line, in steps.
+        Largest distance of a point from its true curve, in steps.
+    error_index : int
+        The block with this error, by its number in the group; the first of several.
     error_at : tuple of int
-        (ΔX, ΔY, x, y): the line, and the point relative to its start.
+        The point with this error, in steps.
     ends_missed : int
-        Lines that were not done on their end point.
-    summations, longest : int
-        Summations of all lines, and steps of their longer axes.
-    mismatches : list of str
-        Where RTL and golden model differ, the first of every batch.
+        Blocks that were not done on their end point, or not refused as they had to be.
+    completed : int
+        Arcs that took completing steps.
+    summations : int
+        Clocks in which the device ran.
+    length : float
+        Steps of the axis that moves faster, of all blocks.
+    findings : list of str
+        Where RTL and golden model differ or why the device was given up, the first of every part.
     """
 
     variant: dict[str, Any]
-    lines: int = 0
+    group: int
+    blocks: int = 0
+    compared: int = 0
     clocks: int = 0
     largest_error: float = 0.0
+    error_index: int = 0
     error_at: tuple[int, ...] = ()
     ends_missed: int = 0
+    completed: int = 0
     summations: int = 0
-    longest: int = 0
-    mismatches: list[str] = field(default_factory=list)
+    length: float = 0.0
+    findings: list[str] = field(default_factory=list)
 
     @property
     def good(self) -> bool:
         """RTL and golden model agree and no end was missed."""
-        return not self.mismatches and not self.ends_missed
+        return not self.findings and not self.ends_missed
 
     def add(self, other: "SurveyRow") -> None:
         """Take in another part of the same survey."""
         # Parts come in any order: of equal errors the same one must win.
-        worst = max((row.largest_error, row.error_at) for row in (self, other))
-        self.largest_error, self.error_at = worst
-        for name in ("lines", "clocks", "ends_missed", "summations", "longest"):
+        if (other.largest_error, -other.error_index) > (self.largest_error, -self.error_index):
+            self.largest_error, self.error_index = other.largest_error, other.error_index
+            self.error_at = other.error_at
+        for name in (
+            *("blocks", "compared", "clocks", "ends_missed", "completed", "summations"),
+            *("length", "findings"),
+        ):
             setattr(self, name, getattr(self, name) + getattr(other, name))
-        self.mismatches += other.mismatches
 
 
-def survey_lines(width: int) -> tuple[np.ndarray, bool]:
-    """Choose the lines of a survey and where they lie.
+class _Curve(Protocol):
+    """What a survey must know of the curves that a method draws.
 
-    Every pair of lengths there is, or a sample of 2^16 seeded pairs or fewer when all of them would
-    take more than :data:`CLOCK_BUDGET` clocks. Quadrant and start point are drawn from the seed.
-
-    Returns
-    -------
-    blocks : array of int64, shape (lines, 4)
-        XH, YH, XK, YK.
-    exhaustive : bool
-
-    Raises
-    ------
-    ValueError
-        A single line of this width takes more clocks than the budget.
+    Attributes
+    ----------
+    fields : tuple of str
+        The fields of a block.
+    watch : tuple of str
+        ``running``, and what registers :meth:`completing` needs.
     """
-    modulus = 1 << width
-    random = np.random.default_rng(SEED)
-    clocks = modulus + _OVERHEAD
-    exhaustive = modulus * modulus * clocks <= CLOCK_BUDGET
-    if exhaustive:
-        lengths = np.stack(np.divmod(np.arange(modulus * modulus), modulus), axis=1)
-    else:
-        count = min(1 << 16, CLOCK_BUDGET // clocks)
-        if count < 64:
-            raise ValueError(
-                f"width {width} is too large to survey: one line takes up to {modulus} clocks; "
-                f"choose a width up to {(CLOCK_BUDGET // 64 - _OVERHEAD).bit_length() - 1}"
-            )
-        lengths = random.integers(0, modulus, (count, 2))
-    signs = random.choice((-1, 1), lengths.shape)
-    low = np.where(signs < 0, lengths, 0) - modulus
-    high = np.where(signs > 0, -lengths, 0) + modulus - 1
-    starts = random.integers(low, high, endpoint=True)
-    return np.concatenate([starts, starts + signs * lengths], axis=1), exhaustive
+
+    fields: tuple[str, ...]
+    watch: tuple[str, ...]
+
+    def contour(self, blocks: np.ndarray) -> Contour:
+        """Give what compares the steps with the true curves."""
+        ...
+
+    def clocks(self, method: Method, golden: Any, group: Group) -> np.ndarray:
+        """Give about how many clocks every block takes."""
+        ...
+
+    def completing(self, seen: dict[str, np.ndarray]) -> np.ndarray:
+        """Tell the clocks in which a completing step is put out, shape (clocks,)."""
+        ...
+
+    def say(self, block: np.ndarray, point: np.ndarray) -> tuple[str, str]:
+        """Write a block and a point of it as a table has them."""
+        ...
 
 
-def survey(method: Method, width: int) -> Iterator[SurveyRow]:
-    """Survey every variant of a method on all cores, and give the results part by part.
+class _Lines:
+    """Lines in the plane."""
+
+    fields: tuple[str, ...] = ("start_x", "start_y", "end_x", "end_y")
+    watch: tuple[str, ...] = ("running",)
+
+    def contour(self, blocks: np.ndarray) -> LineContour:
+        """Compare with the lines."""
+        return LineContour(blocks)
+
+    def clocks(self, method: Method, golden: Any, group: Group) -> np.ndarray:
+        """Give the most clocks that they can take, and few take fewer."""
+        return method.clocks(golden, group.blocks)
+
+    def completing(self, seen: dict[str, np.ndarray]) -> np.ndarray:
+        """Tell that lines have no completing steps."""
+        return np.zeros(len(seen["running"]), dtype=bool)
+
+    def say(self, block: np.ndarray, point: np.ndarray) -> tuple[str, str]:
+        """Write the lengths with their signs, and the point as seen from the start."""
+        return say_point(block[2:] - block[:2]), say_point(point - block[:2])
+
+
+class _Arcs:
+    """Arcs of circles."""
+
+    fields: tuple[str, ...] = (*_Lines.fields, "center_x", "center_y", "clockwise", "full_turns")
+    watch: tuple[str, ...] = ("running", "turns", "backward", "p1", "p2", "p3", "p4")
+
+    def contour(self, blocks: np.ndarray) -> ArcContour:
+        """Compare with the circles."""
+        return ArcContour(blocks)
+
+    def clocks(self, method: Method, golden: Any, group: Group) -> np.ndarray:  # noqa: ARG002
+        """Give 2^bits for every radian, all that the angle may take, and the preparation."""
+        start, _ = seen_from_center(group.blocks)
+        radius = np.maximum(np.hypot(*start.T.astype(float)), 1)
+        bits = np.ceil(np.log2(radius)) if golden.normalize else golden.width
+        radians = group.lengths / radius * (pi / sqrt(8))
+        return (radians * 2.0 ** (bits + golden.guard)).astype(np.int64) + 2 * golden.width + 8
+
+    def completing(self, seen: dict[str, np.ndarray]) -> np.ndarray:
+        """Tell the clocks in which nothing that has steps left would move."""
+        still_x = (seen["p3"] == 0) | (seen["backward"] == 1) | (seen["p2"] == 0)
+        still_y = (seen["p4"] == 0) | (seen["p1"] == 0)
+        return (seen["running"] == 1) & (seen["turns"] == 0) & still_x & still_y
+
+    def say(self, block: np.ndarray, point: np.ndarray) -> tuple[str, str]:
+        """Write the arc with what is not usual of it, and the point."""
+        start, end, center = np.split(block[:6], 3)
+        about = f" about {say_point(center)}" if center.any() else ""
+        arc = f"{say_point(start)} to {say_point(end)}{about}{' cw' if block[6] else ''}"
+        return arc, say_point(point)
+
+
+_CURVES: dict[str, _Curve] = {"line": _Lines(), "arc": _Arcs()}
+
+
+def say_worst(method: Method, group: Group, row: SurveyRow) -> tuple[str, str]:
+    """Write the block with the largest error, and the point, as a table has them.
+
+    A line is written as its lengths with their signs, and the point as seen from its start; an arc
+    as start and end, with ``about`` its center if that is not the origin, and ``cw``.
+    """
+    return _CURVES[method.curve].say(group.blocks[row.error_index], np.array(row.error_at))
+
+
+def survey(
+    method: Method, width: int, groups: Sequence[Group], variants: Sequence[dict[str, Any]]
+) -> Iterator[SurveyRow]:
+    """Survey variants of a method on all cores, and give the results part by part.
+
+    Parameters
+    ----------
+    method : Method
+    width : int
+        4 to 32.
+    groups : sequence of Group
+        Chosen for this width; see :mod:`discreta.sim.groups`.
+    variants : sequence of dict
+        Values for all of the method's choices.
 
     Raises
     ------
     RuntimeError
         There is no C++ compiler.
-    ValueError
-        The width has too many clocks; see :func:`survey_lines`.
     """
-    blocks, _ = survey_lines(width)
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        jobs = []
+    parts = [
+        part
+        for variant in variants
+        for number, group in enumerate(groups)
+        for part in _parts(
+            method, width, variant, number, group, REGISTER_BUDGET // len(variants) // len(groups)
+        )
+    ]
+    with ProcessPoolExecutor(os.cpu_count(), initializer=_begin, initargs=(groups,)) as pool:
         try:
             # Compiled here, found in the cache by every part.
-            keys = [tuple(variant.items()) for variant in method.variants()]
-            list(pool.map(_compile, repeat(method.name), repeat(width), keys))
-            for variant in method.variants():
-                # Lines of like length side by side: a part runs as long as its longest line.
-                golden = method.golden(width, 2, **variant)
-                order = np.argsort(method.summations(golden, _lengths(blocks)), kind="stable")
-                for part in np.array_split(blocks[order], -(-len(blocks) // _BATCH)):
-                    jobs.append(pool.submit(_survey_part, method.name, width, variant, part))
-            for job in as_completed(jobs):
+            list(pool.map(_compile, repeat(method.name), repeat(width), variants))
+            for job in as_completed([pool.submit(_survey_part, part) for part in parts]):
                 yield job.result()
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
 
 
-@lru_cache(maxsize=1)  # a thousand copies of a design take 100 MiB
-def _model(name: str, width: int, variant: tuple[tuple[str, Any], ...]) -> CompiledModel:
-    """Give the RTL with every register watched, made once in a process."""
-    method = METHODS[name]
-    watch = tuple(f"reg_{register}" for register in method.golden(width, 2).registers())
-    return CompiledModel(method.device(width, 2, **dict(variant)), watch=watch)
+@dataclass(frozen=True)
+class _Part:
+    """Blocks of a group, by their numbers, to be run one behind the other."""
+
+    method: str
+    width: int
+    variant: dict[str, Any]
+    group: int
+    chosen: np.ndarray
+    compared: bool
 
 
-def _compile(name: str, width: int, variant: tuple[tuple[str, Any], ...]) -> None:
-    _model(name, width, variant)
+def _parts(
+    method: Method, width: int, variant: dict[str, Any], number: int, group: Group, budget: int
+) -> Iterator[_Part]:
+    """Split a group: into what is compared within a budget of clocks and what is not, and these."""
+    golden = method.model(width, 2, **variant)
+    clocks = _CURVES[method.curve].clocks(method, golden, group)
+    mixed = np.random.default_rng(SEED).permutation(len(clocks))
+    count = np.searchsorted(np.cumsum(clocks[mixed]), budget, side="right")
+    for compared, chosen in ((True, mixed[:count]), (False, mixed[count:])):
+        chosen = np.sort(chosen)
+        pieces = min(len(chosen), -(-int(clocks[chosen].sum()) // _PART))
+        for first in range(pieces):
+            yield _Part(method.name, width, variant, number, chosen[first::pieces], compared)
 
 
-def _lengths(blocks: np.ndarray) -> np.ndarray:
-    return np.abs(blocks[:, 2:] - blocks[:, :2])
+#: The groups that this process surveys.
+_groups: Sequence[Group] = ()
 
 
-def _survey_part(name: str, width: int, variant: dict[str, Any], blocks: np.ndarray) -> SurveyRow:
-    """Run some lines side by side: all of them in the golden model, slice by slice in the RTL."""
-    method = METHODS[name]
-    golden = method.golden(width, 2, **variant)
-    clocks = int(method.summations(golden, _lengths(blocks)).max()) + _OVERHEAD
-    names = list(golden.registers())
-    model = _model(name, width, tuple(variant.items()))
-    row = SurveyRow(variant, lines=len(blocks), clocks=len(blocks) * clocks)
-    judge = _Judge(row, blocks)
-    window = max(1, _WINDOW // len(blocks))
-    windows = model.lanes(blocks, clocks, window=window)
-    clock = 0
-    for seen, wanted in zip(windows, _run_golden(golden, blocks, clocks, window), strict=True):
-        if not row.mismatches and not np.array_equal(seen, wanted):
-            lane, late, register = np.argwhere(seen != wanted)[0]
-            row.mismatches.append(
-                f"{names[register]} is {seen[lane, late, register]} in clock {clock + late} of the "
-                f"line {blocks[lane].tolist()}, where the golden model has "
-                f"{wanted[lane, late, register]}"
-            )
-        judge.follow(clock, dict(zip(names, np.moveaxis(seen, 2, 0), strict=True)))
-        clock += seen.shape[1]
-    judge.end()
-    return row
+def _begin(groups: Sequence[Group]) -> None:
+    global _groups
+    _groups = groups
 
 
-def _run_golden(golden: Any, blocks: np.ndarray, clocks: int, window: int) -> Iterator[np.ndarray]:
-    """Give every register at every clock, shape (lines, clocks of a window, registers)."""
-    state = {name: np.full(len(blocks), value) for name, value in golden.reset().items()}
-    fields = ("blocks_start_x", "blocks_start_y", "blocks_end_x", "blocks_end_y")
-    inputs: dict[str, Any] = dict(zip(fields, blocks.T, strict=True))
-    inputs |= {"blocks_valid": 1, "steps_ready": 1}
-    names = list(golden.registers())
-    for begin in range(0, clocks, window):
-        count = min(window, clocks - begin)
-        record = np.empty((count, len(names), len(blocks)), dtype=np.int64)
-        for clock in range(count):
-            for index, name in enumerate(names):
-                record[clock, index] = state[name]
-            state = golden.step(state, inputs)
-            inputs["blocks_valid"] = 0
-        lines = np.ascontiguousarray(record.reshape(-1, len(blocks)).T)
-        yield lines.reshape(len(blocks), count, len(names))
+def _compile(name: str, width: int, variant: dict[str, Any]) -> None:
+    CompiledModel(METHODS[name].core(width, 2, **variant)).close()
+
+
+def _survey_part(part: _Part) -> SurveyRow:
+    """Run blocks one behind the other and judge them."""
+    method, group = METHODS[part.method], _groups[part.group]
+    core = method.core(part.width, 2, **part.variant)
+    golden = method.model(part.width, 2, **part.variant)
+    blocks, answers = group.blocks[part.chosen], group.answers[part.chosen]
+    judge = _Judge(method, blocks, golden if part.compared else None)
+    limit = int(method.clocks(golden, blocks).sum()) + _OVERHEAD
+    watch = tuple(f"reg_{name}" for name in judge.names)
+    try:
+        for stretch in simulate(core, blocks, limit=limit, engine="compiled", watch=watch):
+            judge.follow(stretch)
+    except DeadCoreError as error:
+        judge.findings.append(str(error))
+    contour = judge.contour
+    right = np.where(answers == 0, contour.reached, contour.block_steps == 0)
+    return SurveyRow(
+        part.variant,
+        part.group,
+        blocks=len(blocks),
+        compared=len(blocks) if part.compared else 0,
+        clocks=judge.clocks,
+        largest_error=contour.largest_error,
+        error_index=int(part.chosen[np.argmax(contour.block_errors)]),
+        error_at=contour.error_at,
+        ends_missed=int(np.count_nonzero(~(right & (judge.errors == answers)))),
+        completed=int(np.count_nonzero(judge.completed)),
+        summations=judge.summations,
+        length=float(group.lengths[part.chosen].sum()),
+        findings=judge.findings,
+    )
 
 
 class _Judge:
-    """Takes the recorded registers, window by window, into a row."""
+    """Takes in a run of blocks, stretch by stretch.
 
-    def __init__(self, row: SurveyRow, blocks: np.ndarray):
-        self._row = row
-        self._starts = blocks[:, :2]
-        self._lengths = blocks[:, 2:] - blocks[:, :2]
-        self._moves = np.any(self._lengths != 0, axis=1)
-        self._answers = np.zeros(len(blocks), dtype=np.int64)
-        self._ended = np.zeros(len(blocks), dtype=bool)
-        row.longest += int(np.abs(self._lengths).max(axis=1).sum())
+    Without a golden model no registers are compared.
+    """
 
-    def follow(self, clock: int, seen: dict[str, np.ndarray]) -> None:
-        """Take in a window that begins with ``clock``; registers have shape (lines, clocks)."""
-        row, moves = self._row, self._moves
-        points = np.stack([seen["p3"], seen["p4"]], axis=-1) - self._starts[:, None]
-        # Accepted in clock 0 and started in clock 1: the position holds from clock 2 on.
-        late = max(0, 2 - clock)
-        errors = distance_from_line(points[moves, late:], self._lengths[moves, None])
-        if errors.size and errors.max() > row.largest_error:
-            row.largest_error = float(errors.max())
-            lane, when = np.unravel_index(np.argmax(errors), errors.shape)
-            line, point = self._lengths[moves][lane], points[moves][lane, when + late]
-            row.error_at = (*line.tolist(), *point.tolist())
-        self._answers += seen["done"].sum(axis=1)
-        self._ended = np.all(points[:, -1] == self._lengths, axis=1)
-        row.summations += int(seen["running"].sum())
+    def __init__(self, method: Method, blocks: np.ndarray, golden: Any | None):
+        self._curve, self._name = _CURVES[method.curve], method.curve
+        self._blocks, self._golden = blocks, golden
+        self.names = tuple(golden.registers()) if golden else self._curve.watch
+        self.contour = self._curve.contour(blocks)
+        self.clocks = self.summations = 0
+        self.findings: list[str] = []
+        self.completed = np.zeros(len(blocks), dtype=bool)
+        #: The error that each block was answered with; −1 without an answer.
+        self.errors = np.full(len(blocks), -1)
+        #: The clocks of the acceptances and of the answers so far.
+        self._accepted = self._answered = np.empty(0, dtype=np.int64)
+        #: The registers that the golden model has in the next clock.
+        self._next = (
+            np.array([golden.reset()[name] for name in self.names]) if golden else np.empty(0)
+        )
 
-    def end(self) -> None:
-        """Count the lines that were not done, once, on their end point."""
-        self._row.ends_missed += int(np.count_nonzero(~(self._ended & (self._answers == 1))))
+    def follow(self, stretch: Stretch) -> None:
+        """Take in a stretch."""
+        self.contour.follow(stretch)
+        column = dict(zip(EVENT_COLUMNS, stretch.events.T, strict=False))
+        accepted, answers = column["accepted"] == 1, (column["done"] | column["error"]) != 0
+        answered = len(self._answered)
+        self._accepted = np.append(self._accepted, column["clock"][accepted])
+        self._answered = np.append(self._answered, column["clock"][answers])
+        self.errors[answered : len(self._answered)] = column["error"][answers]
+        for begin in range(0, stretch.ran, _BATCH):
+            # The values of a register side by side, which is quicker to work with.
+            seen = np.ascontiguousarray(stretch.watch[begin : begin + _BATCH].T)
+            self._watch(self.clocks + begin, dict(zip(self.names, seen, strict=True)))
+            if self._golden and not self.findings:
+                self._compare(self.clocks + begin, seen)
+        self.clocks += stretch.ran
+
+    def _watch(self, first: int, seen: dict[str, np.ndarray]) -> None:
+        """Take in what was watched in the clocks from ``first`` on."""
+        self.summations += int(seen["running"].sum())
+        completing = first + np.flatnonzero(self._curve.completing(seen))
+        # A block is answered before the next one runs for the first time.
+        blocks = np.searchsorted(self._answered, completing, side="right")
+        self.completed[np.minimum(blocks, len(self.completed) - 1)] = True
+
+    def _compare(self, first: int, seen: np.ndarray) -> None:
+        """Compare every register, shape (registers, clocks), with what follows from before."""
+        assert self._golden
+        clocks = np.arange(first, first + seen.shape[1])
+        offered = np.searchsorted(self._accepted, clocks, side="left")
+        block = self._blocks[np.minimum(offered, len(self._blocks) - 1)]
+        inputs = {f"blocks_{name}": block.T[i] for i, name in enumerate(self._curve.fields)}
+        inputs |= {"blocks_valid": (offered < len(self._blocks)).astype(np.int64), "steps_ready": 1}
+        after = self._golden.step(dict(zip(self.names, seen, strict=True)), inputs)
+        after = np.stack([np.broadcast_to(after[name], clocks.shape) for name in self.names])
+        wanted = np.column_stack([self._next, after[:, :-1]])
+        self._next = after[:, -1]
+        wrong = seen != wanted
+        if wrong.any():
+            clock = int(wrong.any(axis=0).argmax())
+            register = int(wrong[:, clock].argmax())
+            self.findings.append(
+                f"{self.names[register]} is {seen[register, clock]} in clock "
+                f"{self._when(first + clock)}, where the golden model has {wanted[register, clock]}"
+            )
+
+    def _when(self, clock: int) -> str:
+        """Tell a clock from the last acceptance."""
+        accepted = np.searchsorted(self._accepted, clock, side="right")
+        if not accepted:
+            return f"{clock} after reset"
+        block = self._blocks[accepted - 1].tolist()
+        return f"{clock - self._accepted[accepted - 1]} of the {self._name} {block}"

@@ -1,4 +1,4 @@
-"""Broken variants of the linear interpolator, and which rungs of the ladder must catch each.
+"""Broken variants of the interpolators, and which rungs of the ladder must catch each.
 
 A variant is the sound device with a few assignments added behind its own: in Amaranth the last one
 wins. Its registers keep their names, so it can be simulated, compiled, converted and proven like
@@ -6,15 +6,20 @@ the sound one.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
-from amaranth import Module, Signal
+from amaranth import Module, Mux, Signal
 from amaranth.hdl import Value
 
+from discreta.hdl.circular import Circular
 from discreta.hdl.contract import ErrorCode, Part
 from discreta.hdl.linear import Linear
+from discreta.sim.golden.circular import Circular as GoldenCircular
 from discreta.sim.golden.linear import Linear as GoldenLinear
+from discreta.sim.golden.logic import equal, where
+from discreta.sim.methods import METHODS, Method
 
 __all__ = ["SOUND", "VARIANTS", "Variant"]
 
@@ -36,6 +41,8 @@ class Variant:
 
     Attributes
     ----------
+    method : Method
+        Sound device and golden model.
     name, what : str
         What it is called, and what is broken, in one line.
     caught_by : set of str
@@ -44,49 +51,62 @@ class Variant:
         The parameters of the device besides its width.
     break_it : callable
         Breaks a sound device that has just been made.
-    golden_class : type
-        The golden model that the device is compared with.
     """
 
+    method: Method
     name: str
     what: str
     caught_by: set[str] = field(default_factory=set)
     options: dict[str, Any] = field(default_factory=dict)
-    break_it: Callable[[Linear], None] = lambda _: None
-    golden_class: type[GoldenLinear] = GoldenLinear
+    break_it: Callable[[Any], None] = lambda _: None
 
-    def device(self, width: int) -> Linear:
+    def device(self, width: int) -> Part:
         """Make the device."""
-        core = Linear(width, 2, **self.options)
+        core = self.method.core(width, **self.options)
         self.break_it(core)
         return core
 
-    def golden(self, width: int) -> GoldenLinear:
+    def golden(self, width: int) -> Any:
         """Make the golden model that goes with it."""
-        return self.golden_class(width, 2, **self.options)
+        return self.method.model(width, **self.options)
 
 
 SOUND = [
-    Variant("sound", "nothing: normalized, preload half"),
+    Variant(METHODS["linear"], "sound line", "nothing: normalized, preload half"),
     Variant(
-        "sound, plain",
+        METHODS["linear"],
+        "sound line, plain",
         "nothing: as in the documents, not normalized, preload zero",
-        options={"normalize": False, "preload": "zero"},
+        options=METHODS["linear"].settings["lecture"],
+    ),
+    Variant(METHODS["circular"], "sound arc", "nothing: the default setting"),
+    Variant(
+        METHODS["circular"],
+        "sound arc, lecture",
+        "nothing: as in the lecture's block diagram",
+        options=METHODS["circular"].settings["lecture"],
     ),
 ]
 VARIANTS: list[Variant] = []
 
 
 def _variant(
-    caught_by: set[str], *, golden_class: type[GoldenLinear] = GoldenLinear, **options: Any
-) -> Callable[[Callable[[Linear], None]], None]:
-    """List a function that breaks a device, under its name and with its docstring."""
+    method: str, caught_by: set[str], *, golden: Callable[..., Any] | None = None, **options: Any
+) -> Callable[[Callable[[Any], None]], None]:
+    """List a function that breaks a device, under its name and with its docstring.
 
-    def add(break_it: Callable[[Linear], None]) -> None:
+    ``golden`` replaces the golden model, by one that makes the same mistake.
+    """
+    broken = METHODS[method] if golden is None else replace(METHODS[method], golden=golden)
+
+    def add(break_it: Callable[[Any], None]) -> None:
         name, what = break_it.__name__.replace("_", " "), break_it.__doc__ or ""
-        VARIANTS.append(Variant(name, what, caught_by, options, break_it, golden_class))
+        VARIANTS.append(Variant(broken, name, what, caught_by, options, break_it))
 
     return add
+
+
+_line, _arc = partial(_variant, "linear"), partial(_variant, "circular")
 
 
 def _amend(part: Part, change: Callable[[Module], None]) -> None:
@@ -113,20 +133,20 @@ def _assign(part: Part, target: Value, value: Any) -> None:
 # Broken sums, counters and steps: whoever looks at a single line sees it.
 
 
-@_variant({*ALL})
+@_line({*ALL})
 def carry_dropped(core: Linear) -> None:
     """When SX and SY carry in the same clock, the step of x is dropped."""
     x, y = core.summator["x"].carry, core.summator["y"].carry
     _assign(core, core.output.carry["x"], x & ~y)
 
 
-@_variant({*ALL})
+@_line({*ALL})
 def counter_not_stopping(core: Linear) -> None:
     """P5 never counts down: a line along x never ends."""
     _assign(core, core.remaining["x"].count, 0)
 
 
-@_variant({*ALL})
+@_line({*ALL})
 def normalized_too_far(core: Linear) -> None:
     """The increments are shifted one place too far, and their top bits are lost."""
 
@@ -137,14 +157,14 @@ def normalized_too_far(core: Linear) -> None:
     _amend(core, change)
 
 
-@_variant({*ALL})
+@_line({*ALL})
 def wrong_preload(core: Linear) -> None:
     """Both summators start a block from M/2 − 1 instead of M/2."""
     for summator in core.summator.values():
-        summator.initial -= 1
+        summator.preloaded -= 1
 
 
-@_variant({*ALL})
+@_line({*ALL})
 def early_end(core: Linear) -> None:
     """A block ends when one of its counters is empty, not both."""
     remaining = core.remaining
@@ -152,7 +172,7 @@ def early_end(core: Linear) -> None:
 
 
 # The steps are right, the coordinates are not: the documents' program judges the steps alone.
-@_variant({*ALL} - {DOCUMENTS})
+@_line({*ALL} - {DOCUMENTS})
 def position_too_soon(core: Linear) -> None:
     """P3 counts with the carry, a clock before its step can be taken."""
     carry, negative = core.summator["x"].carry, core.output.direction_registers["x"]
@@ -160,22 +180,22 @@ def position_too_soon(core: Linear) -> None:
     _assign(core, core.place["x"].down, carry & negative)
 
 
-# Between two blocks: invisible to a single line from reset, which is all the survey runs.
+# Between two blocks: invisible to a single line from reset.
 
 
-@_variant({*ALL} - {COMPILED})
+@_line({*ALL})
 def preload_forgotten(core: Linear) -> None:
     """Only reset sets SX to its preload; a block starts from what the one before left."""
     _assign(core, core.summator["x"].load, 0)
 
 
-@_variant({*ALL} - {COMPILED})
+@_line({*ALL})
 def turned_too_soon(core: Linear) -> None:
     """The sign of a step is that of the prepared block, not of the running one."""
     _assign(core, core.output.load, 1)
 
 
-@_variant({*ALL} - {COMPILED})
+@_line({*ALL})
 def answer_lost(core: Linear) -> None:
     """An empty block starts while the last step before it is taken: two blocks, one answer."""
     uu = core.uu
@@ -185,20 +205,20 @@ def answer_lost(core: Linear) -> None:
 # Only with the right stimuli: neither the documents nor the survey stalls, errs or resets.
 
 
-@_variant({*ALL} - {DOCUMENTS, COMPILED})
+@_line({*ALL} - {DOCUMENTS, COMPILED})
 def step_lost_under_stall(core: Linear) -> None:
     """A step that is not taken is forgotten, and the next one is computed."""
     _assign(core, core.uu.ready, 1)
 
 
-@_variant({*ALL} - {DOCUMENTS, COMPILED})
+@_line({*ALL} - {DOCUMENTS, COMPILED})
 def fault_not_raised(core: Linear) -> None:
     """A block that is too long is run with the low bits of its lengths."""
     _assign(core, core.uu.fault, ErrorCode.NONE)
 
 
 # The promises start from the initial values, and the other benches reset nothing that runs.
-@_variant({EQUIVALENCE} | VERILOG)
+@_line({EQUIVALENCE} | VERILOG)
 def reset_incomplete(core: Linear) -> None:
     """A step of x that waits survives a reset, and is taken after it."""
     fresh = Signal.like(core.registers["pulse_x"], name="pulse_x", reset_less=True)
@@ -209,13 +229,13 @@ def reset_incomplete(core: Linear) -> None:
 # empty counter lets through is 0; and no bench runs for 65,536 clocks.
 
 
-@_variant({EQUIVALENCE, PROMISES}, preload="zero")
+@_line({EQUIVALENCE, PROMISES}, preload="zero")
 def sum_not_gated(core: Linear) -> None:
     """SX goes on summing when its counter is empty."""
     _assign(core, core.summator["x"].enable, core.uu.clock)
 
 
-@_variant({EQUIVALENCE, PROMISES})
+@_line({EQUIVALENCE, PROMISES})
 def late_failure(core: Linear) -> None:
     """A counter that no one watches drops a step of x every 65,536 clocks."""
     clocks = Signal(16)
@@ -246,7 +266,7 @@ class _StallMisread(GoldenLinear):
         return super().step(state, inputs | {"steps_ready": 1})
 
 
-@_variant({DOCUMENTS, PROMISES, COMPILED}, golden_class=_AxisMisread)
+@_line({DOCUMENTS, PROMISES, COMPILED}, golden=_AxisMisread)
 def axis_misread(core: Linear) -> None:
     """Device and golden model both take y to grow downwards, as on a screen."""
     inp = core.input
@@ -259,7 +279,210 @@ def axis_misread(core: Linear) -> None:
     _amend(inp, change)
 
 
-@_variant({PROMISES}, golden_class=_StallMisread)
+@_line({PROMISES}, golden=_StallMisread)
 def stall_misread(core: Linear) -> None:
     """Device and golden model both take a step to be gone after a clock, taken or not."""
     _assign(core, core.uu.ready, 1)
+
+
+# Arcs. Broken sums, counters and frames: whoever looks at some arcs sees it.
+
+
+def _turns(core: Circular) -> Value:
+    """Tell the clock in which the frame is turned."""
+    return core.uu.clock & ~core.fresh & (core.turns != 0) & core.p3.zero
+
+
+def _put_out(core: Circular, step_x: Value, step_y: Value) -> None:
+    """Have these steps in place of the device's own, wherever they go."""
+
+    def change(m: Module) -> None:
+        m.d.comb += [
+            core.p1.down.eq(step_x & ~core.backward),
+            core.p1.up.eq(step_x & core.backward),
+            core.p2.up.eq(step_y),
+            core.p3.count.eq(step_x),
+            core.p4.count.eq(step_y),
+            core.output.carry.x.eq(Mux(core.swap, step_y, step_x)),
+            core.output.carry.y.eq(Mux(core.swap, step_x, step_y)),
+        ]
+
+    _amend(core, change)
+
+
+@_arc({*ALL})
+def sign_as_printed(core: Circular) -> None:
+    """P1 counts up when X steps, as the lecture prints it, and not down."""
+    _assign(core, core.p1.up, core.p3.count)
+    _assign(core, core.p1.down, 0)
+
+
+@_arc({*ALL})
+def order_swapped(core: Circular) -> None:
+    """SY adds the X from before the summation, though the order is alternated."""
+
+    def change(m: Module) -> None:
+        m.d.comb += core.sy.addend.eq(m.submodules.normalizer.normalized.x)
+
+    _amend(core, change)
+
+
+@_arc({*ALL})
+def half_increment_forgotten(core: Circular) -> None:
+    """The first clock leaves SX at M/2."""
+    _assign(core, core.sx.load, core.uu.load | _turns(core))
+
+
+@_arc({*ALL})
+def fraction_not_turned(core: Circular) -> None:
+    """At a crossing SX takes over SY as it is, though the axis falls now."""
+
+    def change(m: Module) -> None:
+        with m.If(_turns(core)):
+            m.d.comb += core.sx.initial.eq(core.sy.register)
+
+    _amend(core, change)
+
+
+@_arc({*ALL})
+def direction_not_turned(core: Circular) -> None:
+    """At a crossing both axes go on in the direction in which they moved."""
+    _assign(core, core.output.load, core.uu.load)
+
+
+@_arc({*ALL})
+def axes_not_swapped(core: Circular) -> None:
+    """X is always the machine's x, in every quadrant."""
+    _assign(core, core.output.carry.x, core.p3.count)
+    _assign(core, core.output.carry.y, core.p4.count)
+
+
+@_arc({*ALL})
+def a_crossing_too_many(core: Circular) -> None:
+    """An arc of several pieces is loaded with one turn more than it has."""
+
+    def change(m: Module) -> None:
+        with m.If(core.uu.load):
+            turns = core.input.first_turns
+            m.d.sync += core.turns.eq(turns + (turns != 0))
+
+    _amend(core, change)
+
+
+@_arc({*ALL})
+def counters_loaded_too_early(core: Circular) -> None:
+    """The counters of the last piece are loaded on entering the one before it."""
+
+    def change(m: Module) -> None:
+        y, xk = core.p2.register, core.xk.register
+        left = Mux(y < xk, xk - y, y - xk)
+        early = core.turns == 2
+        with m.If(_turns(core)):
+            m.d.comb += core.p3.initial.eq(Mux(early, left, y))
+            m.d.comb += core.p4.initial.eq(Mux(early, core.yk.register, core.limit.register))
+
+    _amend(core, change)
+
+
+@_arc({*ALL})
+def completing_step_missing(core: Circular) -> None:
+    """What is left when there can be no more carries is never put out."""
+    _put_out(core, core.sx.carry, core.sy.carry)
+
+
+@_arc({*ALL})
+def backward_ignored(core: Circular) -> None:
+    """An X that lies short of its end is summed on, and P1 counts down."""
+
+    def change(m: Module) -> None:
+        with m.If(_turns(core)):
+            m.d.sync += core.backward.eq(0)
+
+    _amend(core, change)
+
+
+@_arc({*ALL}, **METHODS["circular"].settings["lecture"])
+def limit_ignored(core: Circular) -> None:
+    """An axis may rise as far as n bits go."""
+    _assign(core.input, core.input.limit, 2**core.width - 1)
+
+
+# An end that is just a step off: the arcs of a survey end nearer to their circles.
+@_arc({*ALL} - {COMPILED})
+def radius_check_off_by_one(core: Circular) -> None:
+    """An end that is a whole step outside the circle is refused."""
+    meter = core.input.meter
+    difference, root = meter.end_square, meter.root_register
+    near = (difference + root >= 1) & (difference - 1 < root) & (root != 0)
+    _assign(meter, meter.near, near)
+
+
+# The steps are right, the coordinates are not: the documents judge the steps alone.
+@_arc({*ALL} - {DOCUMENTS})
+def centre_ignored(core: Circular) -> None:
+    """XT starts from the start as it is seen from the centre."""
+    inp = core.input
+    _assign(core, core.xt.initial, inp.start.x - inp.center_registers["x"])
+
+
+# Only with the right stimuli: neither the documents nor the survey stalls or errs.
+
+
+@_arc({*ALL} - {DOCUMENTS, COMPILED})
+def off_curve_not_refused(core: Circular) -> None:
+    """An arc is run wherever it ends, unless it starts from its centre."""
+    _assign(core.input.meter, core.input.meter.near, core.input.meter.root_register != 0)
+
+
+@_arc({*ALL} - {DOCUMENTS, COMPILED})
+def crossing_does_not_wait(core: Circular) -> None:
+    """The frame is turned while the step before it still waits, which turns with it."""
+
+    def change(m: Module) -> None:
+        turn = core.uu.running & ~core.fresh & (core.turns != 0) & core.p3.zero
+        parts = (core.p1, core.p2, core.p3, core.p4, core.sx, core.sy, core.output)
+        with m.If(turn):
+            m.d.comb += [part.load.eq(1) for part in parts]
+            m.d.sync += [core.turns.eq(core.turns - 1), core.swap.eq(~core.swap)]
+
+    _amend(core, change)
+
+
+# Equal to its golden model, and wrong.
+
+
+class _WayMisread(GoldenCircular):
+    """The mistake of :func:`way_misread`, made a second time."""
+
+    def step(self, state, inputs):
+        return super().step(state, inputs | {"blocks_clockwise": inputs["blocks_clockwise"] ^ 1})
+
+
+class _RimMisread(GoldenCircular):
+    """The mistake of :func:`rim_misread`, made a second time."""
+
+    def step(self, state, inputs):
+        after = super().step(state, inputs)
+        measured = equal(state["tick"], 2 * self.width + 4) & after["empty"]
+        at_rim = equal(state["center_x"], 2**self.width - 1)
+        return after | {"fault": where(measured & at_rim, 1, after["fault"])}
+
+
+@_arc({DOCUMENTS, PROMISES, COMPILED}, golden=_WayMisread)
+def way_misread(core: Circular) -> None:
+    """Device and golden model both take clockwise for counter-clockwise."""
+    _assign(core, core.input.blocks.payload.clockwise, ~core.blocks.payload.clockwise)
+
+
+@_arc({PROMISES}, golden=_RimMisread)
+def rim_misread(core: Circular) -> None:
+    """Device and golden model both take a block of no length at the rim to go round."""
+    inp = core.input
+
+    def change(m: Module) -> None:
+        at_rim = inp.center_registers["x"] == 2**core.width - 1
+        measured = inp.meter.measured & ~(inp.blocks.valid & inp.blocks.ready)
+        with m.If(measured & inp.meter.zero & at_rim):
+            m.d.sync += inp.fault_register.eq(ErrorCode.RANGE)
+
+    _amend(inp, change)

@@ -11,8 +11,8 @@ import textwrap
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from importlib import import_module
 from itertools import product
-from math import sqrt
 from unittest.mock import patch
 
 import numpy as np
@@ -21,21 +21,23 @@ from rich.box import MARKDOWN
 from rich.console import Console
 from rich.table import Table
 
-from discreta.hdl.linear import Linear
+from discreta.hdl.contract import Part
 from discreta.hdl.plain import PlainPorts
 from discreta.hdl.verilog import verilog
 from discreta.sim import compiled as engine
 from discreta.sim import survey
 from discreta.sim.foreign import UnknownOutputError, available, run_foreign
-from discreta.sim.golden.linear import Linear as GoldenLinear
+from discreta.sim.groups import survey_groups
 from discreta.sim.interpreted import PysimModel
 from discreta.sim.methods import METHODS
-from discreta.sim.proofs import linear as proofs
 from discreta.sim.simulate import DeadCoreError, simulate
-from discreta.sim.smt import Obligation, Rtl, check, equivalence, extend, symbols
+from discreta.sim.smt import Obligation, Rtl, check, equivalence, extend
 from discreta.sim.stalls import NO_STALLS, Stalls
 from discreta.sim.stretch import EVENT_COLUMNS
+from tests import lecture
+from tests.arcs import arc_steps, draw_arcs, fault
 from tests.broken import ALL, SOUND, VARIANTS, Variant
+from tests.hdl.traces import golden_trace
 
 __all__ = ["RUNGS", "matrix", "missing"]
 
@@ -43,46 +45,64 @@ WIDTH = 4
 SEED = 1970
 
 #: Clocks of the golden model after which a bench counts as wrong itself.
-_CLOCK_LIMIT = 5000
+_CLOCK_LIMIT = 9000
+
+#: What a document says of a block: its name, and (summations, point) of every step, from the first.
+_Said = tuple[str, list[tuple[int, tuple[int, ...]]]]
 
 
 def documents(variant: Variant) -> str:
-    """Judge the steps of every line of a width by exercise 3's program and the closed form."""
+    """Judge the steps of blocks, one behind the other, by what the documents say of each."""
     core = variant.device(WIDTH)
-    # One behind the other, the line of no length last, behind one that moves.
-    blocks = np.roll(survey.survey_lines(WIDTH)[0], -1, axis=0)
-    limit = len(blocks) * (2**WIDTH + 4)
+    blocks, read = _DOCUMENTS[variant.method.curve]
+    said = [read(core, block) for block in blocks.tolist()]
+    # Twice what it takes: a clock for every summation, and some for what comes before.
+    clocks = [points[-1][0] if points else 0 for ((_, points), *_) in said]
+    limit = 2 * (sum(clocks) + len(blocks) * (2 * WIDTH + 8))
     try:
         events = np.concatenate([part.events for part in simulate(core, blocks, limit=limit)])
     except DeadCoreError as error:
         return str(error)
     taken = events[events[:, EVENT_COLUMNS.index("taken")] == 1]
     taken = taken[:, [EVENT_COLUMNS.index("clock"), *range(len(EVENT_COLUMNS), taken.shape[1])]]
-    for block in blocks:
-        lengths = block[2:] - block[:2]
-        line = f"the line {block.tolist()}"
-        dx, dy = np.abs(lengths).tolist()
-        points = list(_exercise_3(dx, dy, core))
+    for block, sources in zip(blocks, said, strict=True):
+        name = f"the {variant.method.curve} {block.tolist()}"
+        points = sources[0][1]
         rows, taken = taken[: len(points)], taken[len(points) :]
         if len(rows) < len(points):
-            return f"{line} takes {len(rows)} steps, where the program has {len(points)}"
-        moved = (np.cumsum(rows[:, 1:3], axis=0) * np.where(lengths < 0, -1, 1)).tolist()
-        for (t, *point), (clock, _, _, last), seen in zip(points, rows, moved, strict=True):
-            # The documents know no latency: summations are counted from the first step.
-            summation = points[0][0] + int(clock - rows[0, 0])
-            if (summation, seen) != (t, point):
-                return (
-                    f"{line} is at {seen} after {summation} summations, where the program is at "
-                    f"{point} after {t}"
-                )
-            if seen != _closed_form(t, dx, dy, core):
-                return f"{line} is at {seen} after {t} summations, against the closed form"
-            if last != (t == points[-1][0]):
-                return f"{line} has last = {last} at {seen}"
-    return f"{len(taken)} steps after the last line" if len(taken) else ""
+            return f"{name} takes {len(rows)} steps, where {sources[0][0]} has {len(points)}"
+        seen = (block[:2] + np.cumsum(rows[:, 1:3], axis=0)).tolist()
+        for source, points in sources:
+            for (t, point), (clock, *_), at in zip(points, rows.tolist(), seen, strict=True):
+                # The documents know no latency: summations are counted from the first step.
+                summation = points[0][0] + clock - int(rows[0, 0])
+                if (summation, at) != (t, list(point)):
+                    return (
+                        f"{name} is at {at} after {summation} summations, where {source} is at "
+                        f"{list(point)} after {t}"
+                    )
+        if rows[:, 3].tolist() != [0] * (len(rows) - 1) + [1] * (len(rows) > 0):
+            return f"{name} has last = {rows[:, 3].tolist()}"
+    return f"{len(taken)} steps after the last {variant.method.curve}" if len(taken) else ""
 
 
-def _exercise_3(ddx: int, ddy: int, core: Linear) -> Iterator[tuple[int, int, int]]:
+def _line_documents(core: Part, block: list[int]) -> list[_Said]:
+    """Read exercise 3's program and the closed form."""
+    xh, yh, xk, yk = block
+    dx, dy = xk - xh, yk - yh
+
+    def placed(t: int, x: int, y: int) -> tuple[int, tuple[int, ...]]:
+        return t, (xh - x if dx < 0 else xh + x, yh - y if dy < 0 else yh + y)
+
+    program = list(_exercise_3(abs(dx), abs(dy), core))
+    closed = [(t, *_closed_form(t, abs(dx), abs(dy), core)) for t, *_ in program]
+    return [
+        ("the program", [placed(*point) for point in program]),
+        ("the closed form", [placed(*point) for point in closed]),
+    ]
+
+
+def _exercise_3(ddx: int, ddy: int, core: Part) -> Iterator[tuple[int, int, int]]:
     """Run exercise 3's program, and give summations and point whenever it draws one.
 
     The program itself has 16 bits, sums from 0 and does not normalize, though section II says how.
@@ -106,33 +126,43 @@ def _exercise_3(ddx: int, ddy: int, core: Linear) -> Iterator[tuple[int, int, in
             yield t, x, y
 
 
-def _closed_form(t: int, dx: int, dy: int, core: Linear) -> list[int]:
+def _closed_form(t: int, dx: int, dy: int, core: Part) -> list[int]:
     """Give ⌊(S₀ + t·Δ·2^s) / M⌋ of both axes."""
     shift = core.width - max(dx, dy).bit_length() if core.normalize else 0
     return [(_initial_sum(core) + (t * d << shift)) >> core.width for d in (dx, dy)]
 
 
-def _initial_sum(core: Linear) -> int:
+def _initial_sum(core: Part) -> int:
     return 0 if core.preload == "zero" else 2 ** (core.width - 1)
 
 
-def simulation(variant: Variant) -> str:
-    """Compare every register and output at every clock in pysim, without and with stalls."""
-    for stalls in (NO_STALLS, Stalls(seed=SEED, stall=0.4, gap=0.3)):
-        golden = variant.golden(WIDTH)
-        registers, outputs = _golden_run(golden, _blocks(), stalls)
-        names = [f"reg_{name}" for name in golden.registers()]
-        names += list(golden.outputs(golden.reset()))
-        model = PysimModel(variant.device(WIDTH), watch=tuple(names))
-        expected = np.hstack([registers, outputs])
-        seen = model.run(_blocks(), len(expected), stalls=stalls).watch
-        if finding := _difference(seen, expected, names):
-            return finding
-    return ""
+def _arc_documents(core: Part, block: list[int]) -> list[_Said]:
+    """Read the lecture, where it says something: its algorithm, and the rules that it leaves."""
+    options = {name: core.parameters[name] for name in METHODS["circular"].choices}
+    steps = (
+        []
+        if block[:2] == block[2:4] == block[4:6]
+        else arc_steps(block, width=core.width, **options)
+    )
+    # The first summation is in clock 2n + 6, and its step leaves in the next.
+    said = [("the rule", [(clock - 2 * core.width - 6, point) for clock, point in steps])]
+    xh, yh, xk, yk, *rest = block
+    if (
+        options == METHODS["circular"].settings["lecture"]
+        and not any(rest)
+        and (0 <= xk <= xh and 0 <= yh <= yk and (xk, yk) != (xh, yh) and yk)
+    ):
+        run = lecture.run((xh, yh), (xk, yk), core.width, lecture.Reading(order="device"))
+        points = [(cells.xt, cells.yt) for cells in run.cells]
+        drawn = [(t, points[t]) for t in range(1, len(points)) if points[t] != points[t - 1]]
+        # What is waited for in vain is completed in the summation that changes nothing.
+        drawn += [(len(points) - 1, (xk, yk))] * (run.fate == lecture.WAITS)
+        said.append(("the lecture", drawn))
+    return said
 
 
-def _blocks() -> np.ndarray:
-    """Draw blocks of all kinds: every fourth of no length, some too long to run."""
+def _line_blocks() -> np.ndarray:
+    """Draw lines of all kinds: every fourth of no length, some too long to run."""
     random = np.random.default_rng(SEED)
     limit = 2**WIDTH
     starts = random.integers(-limit, limit, (40, 2))
@@ -142,28 +172,55 @@ def _blocks() -> np.ndarray:
     return np.hstack([starts, ends])
 
 
-def _golden_run(
-    golden: GoldenLinear, blocks: np.ndarray, stalls: Stalls, resets: tuple[int, ...] = ()
-) -> tuple[np.ndarray, np.ndarray]:
-    """Give registers and outputs at every clock until nothing is left to do."""
-    fields = [f"blocks_{which}_{a}" for which in ("start", "end") for a in golden.letters]
-    state = golden.reset()
-    fed, held = 0, False
-    registers, outputs = [], []
-    for clock in range(_CLOCK_LIMIT):
-        out = golden.outputs(state)
-        registers.append(list(state.values()))
-        outputs.append(list(out.values()))
-        if fed == len(blocks) and not (out["busy"] or out["done"] or out["error"]):
-            return np.array(registers), np.array(outputs)
-        offers = held or (fed < len(blocks) and stalls.offers(clock))
-        inputs = dict(zip(fields, blocks[min(fed, len(blocks) - 1)].tolist(), strict=True))
-        inputs |= {"blocks_valid": int(offers), "steps_ready": int(stalls.ready(clock))}
-        accepted = offers and out["blocks_ready"] and clock not in resets
-        state = golden.reset() if clock in resets else golden.step(state, inputs)
-        state = {name: state[name] for name in golden.registers()}
-        fed, held = fed + bool(accepted), offers and not accepted
-    raise AssertionError(f"the golden model is not done after {_CLOCK_LIMIT} clocks")
+#: Arcs that end backward, that end with Y short, and whose end is one step outside the circle.
+_NAMED_ARCS = [
+    (-8, 5, -10, -1, 0, 0, 0, 0),
+    (1, -1, 0, 2, 0, 0, 0, 0),
+    (3, 4, 0, 6, 0, 0, 0, 0),
+]
+
+
+def _arc_blocks() -> np.ndarray:
+    """Draw arcs of all kinds, with those of a name between them."""
+    return np.concatenate([draw_arcs(WIDTH, 16, seed=SEED, radius=3, turns=1), _NAMED_ARCS])
+
+
+def _sound_arcs() -> np.ndarray:
+    """Give quarters, circles, and arcs of all kinds that are not refused."""
+    axis = [(r, 0) for r in range(1, 8)]
+    quarters = [(*start, *end[::-1], 0, 0, 0, 0) for start, end in zip(axis, axis, strict=True)]
+    drawn = draw_arcs(WIDTH, 32, seed=SEED + 1, radius=6, turns=1)
+    sound = [block for block in drawn.tolist() if not fault(block, WIDTH)]
+    return np.array([*quarters, *_NAMED_ARCS, *sound])
+
+
+def _lines() -> np.ndarray:
+    """Give every line of the width, the line of no length last, behind one that moves."""
+    return np.roll(survey_groups(METHODS["linear"], WIDTH)[0].blocks, -1, axis=0)
+
+
+#: By the kind of curve: what the documents are asked, and how they are read.
+_DOCUMENTS = {"line": (_lines(), _line_documents), "arc": (_sound_arcs(), _arc_documents)}
+
+#: By the kind of curve: the blocks of the benches that know everything.
+_BLOCKS = {"line": _line_blocks(), "arc": _arc_blocks()}
+
+
+def simulation(variant: Variant) -> str:
+    """Compare every register and output at every clock in pysim, without and with stalls."""
+    for stalls in (NO_STALLS, Stalls(seed=SEED, stall=0.4, gap=0.3)):
+        golden = variant.golden(WIDTH)
+        names = [f"reg_{name}" for name in golden.registers()]
+        names += list(golden.outputs(golden.reset()))
+        model = PysimModel(variant.device(WIDTH), watch=tuple(names))
+        blocks = _BLOCKS[variant.method.curve]
+        expected = np.hstack(
+            golden_trace(golden, model.block_fields, blocks, _CLOCK_LIMIT, stalls, until_idle=True)
+        )
+        seen = model.run(blocks, len(expected), stalls=stalls).watch
+        if finding := _difference(seen, expected, names):
+            return finding
+    return ""
 
 
 def _difference(seen: np.ndarray, expected: np.ndarray, names: list[str]) -> str:
@@ -187,42 +244,86 @@ def equivalence_by_proof(variant: Variant) -> str:
 
 def promises(variant: Variant) -> str:
     """Prove the promises of the device itself, in place of its golden model."""
-    core = variant.device(WIDTH)
-    rtl = Rtl(core)
-    one_clock = [*rtl.transition, rtl.rst == 0]
+    device = _Device(variant)
+    promised = variant.method.promises(device.golden)
+    shared = getattr(import_module(f"discreta.sim.proofs.{variant.method.name}"), "shared", None)
+    promised += shared(device.golden) if shared else []
     return _prove(
         [
-            replace(obligation, assumptions=[*one_clock, *obligation.assumptions])
-            for obligation in proofs.promises(_as_golden(core, rtl))
-            if not obligation.arithmetic  # that is about numbers, whatever the device
+            replace(obligation, assumptions=[*device.clocks, *obligation.assumptions])
+            for obligation in promised
+            # The others are about numbers, whatever the device, or run the golden model.
+            if isinstance(obligation, Obligation) and not obligation.arithmetic
         ]
     )
 
 
-def _as_golden(core: Linear, rtl: Rtl) -> GoldenLinear:
-    """Give a device the face of a golden model: its clock is the one clock of ``rtl``."""
-    after = {}
+class _Device:
+    """A device with the face of its golden model: its clock is a clock of the RTL.
 
-    class Device(GoldenLinear):
-        def reset(self):
-            return {name: register.init for name, register in core.registers.items()}
+    Attributes
+    ----------
+    golden : object
+        The face, of the golden model's own class.
+    clocks : list of z3.BoolRef
+        What ties together the values that the face was given and those that it gave.
+    """
 
-        def step(self, state, inputs):
-            wide = inputs["steps_ready"].size()
-            # The transition speaks of these symbols and of no others.
-            assert z3.eq(state["running"], symbols(rtl.registers, wide)["running"])
-            after.update(symbols(rtl.registers, wide, "'"))
-            return after
+    def __init__(self, variant: Variant):
+        self._core = core = variant.device(WIDTH)
+        self._rtl = Rtl(core)
+        self.clocks: list[z3.BoolRef] = []
+        model = variant.method.golden
+        face = {"reset": self._reset, "step": self._step, "outputs": self._outputs}
+        methods = {name: lambda _, *given, f=f: f(*given) for name, f in face.items()}
+        golden = variant.golden(WIDTH)
+        self.golden = type("Device", (model,), methods)(**vars(golden))
 
-        def outputs(self, state):
-            wide = state["running"].size()
-            mark = "'" if after and z3.eq(state["running"], after["running"]) else ""
-            return {
-                name: extend(z3.BitVec(f"out.{name}{mark}", bits), signed, wide)
-                for name, (bits, signed) in rtl.outputs.items()
-            }
+    def _reset(self):
+        return {name: register.init for name, register in self._core.registers.items()}
 
-    return Device(core.width, core.axes, core.normalize, core.preload)
+    def _step(self, state, inputs):
+        return self._clock(state, inputs, self._rtl.registers, "{}'")
+
+    def _outputs(self, state):
+        return self._clock(state, {}, self._rtl.outputs, "out.{}")
+
+    def _clock(self, state, inputs, wanted, symbol):
+        """Make a clock of its own, and give some values of it."""
+        rtl, given = self._rtl, state | inputs
+        kinds = rtl.registers | rtl.inputs
+        wide = state["running"].size()
+        number = len(self.clocks)
+        pairs = {}
+        for constant in _constants(rtl.transition):
+            name = f"{constant.decl().name()}#{number}"
+            pairs[constant.decl().name()] = (constant, z3.Const(name, constant.sort()))
+        clock = [*rtl.transition, rtl.rst == 0]
+        clock += [
+            extend(z3.BitVec(name, bits), signed, wide) == given[name]
+            for name, (bits, signed) in kinds.items()
+            if name in given
+        ]
+        self.clocks.append(z3.And([z3.substitute(fact, *pairs.values()) for fact in clock]))
+        return {
+            name: extend(pairs[symbol.format(name)][1], signed, wide)
+            for name, (_, signed) in wanted.items()
+        }
+
+
+def _constants(facts: list[z3.BoolRef]) -> list[z3.ExprRef]:
+    """Give all symbols of some facts that stand for a value."""
+    found: dict[str, z3.ExprRef] = {}
+    todo, seen = list(facts), set()
+    while todo:
+        term = todo.pop()
+        if term.get_id() in seen:
+            continue
+        seen.add(term.get_id())
+        todo += term.children()
+        if z3.is_const(term) and term.decl().kind() == z3.Z3_OP_UNINTERPRETED:
+            found[term.decl().name()] = term
+    return list(found.values())
 
 
 def _prove(obligations: list[Obligation]) -> str:
@@ -237,24 +338,29 @@ def _prove(obligations: list[Obligation]) -> str:
 
 
 def compiled(variant: Variant) -> str:
-    """Survey all lines of a width on the compiled engine, each of them from reset."""
+    """Survey a width on the compiled engine."""
     method = replace(
-        METHODS["linear"],
-        name=variant.name,
-        device=lambda width, _, **__: variant.device(width),
-        golden=lambda width, _, **__: variant.golden(width),
+        variant.method, name=variant.name, device=lambda width, **_: variant.device(width)
     )
-    blocks, _ = survey.survey_lines(WIDTH)
-    # Quick to build rather than to run: the runs are short.
-    flags = patch.object(engine, "_FLAGS", (*engine._FLAGS, "-O0"))
-    with patch.dict(METHODS, {method.name: method}), flags:
-        row = survey._survey_part(method.name, WIDTH, variant.options, blocks)
-    findings = list(row.mismatches)
-    bound = 1 if variant.options.get("preload") == "zero" else sqrt(0.5)
-    if row.largest_error > bound + 1e-9:
-        findings.append(f"largest error {row.largest_error:.4f} on the line {row.error_at[:2]}")
-    if row.ends_missed:
-        findings.append(f"{row.ends_missed} ends missed")
+    groups = survey_groups(method, WIDTH)
+    bound = method.bound(variant.golden(WIDTH))
+    findings = []
+    with (
+        patch.dict(METHODS, {method.name: method}),
+        patch.object(survey, "_groups", groups),
+        # Quick to build rather than to run: the runs are short.
+        patch.object(engine, "_FLAGS", (*engine._FLAGS, "-O0")),
+    ):
+        for number, group in enumerate(groups):
+            everything = (method, WIDTH, variant.options, number, group, survey.REGISTER_BUDGET)
+            for part in survey._parts(*everything):
+                row = survey._survey_part(part)
+                findings += row.findings
+                if bound is not None and row.largest_error > bound + 1e-9:
+                    block, point = survey.say_worst(method, group, row)
+                    findings.append(f"largest error {row.largest_error:.4f}: {block} at {point}")
+                if row.ends_missed:
+                    findings.append(f"{row.ends_missed} ends missed of {group.title}")
     return "; ".join(findings)
 
 
@@ -272,12 +378,15 @@ def _foreign(variant: Variant, simulator: str) -> str:
     stalls = Stalls(seed=SEED + 1, stall=0.4, gap=0.3)
     resets = (60, 150, 151)
     golden, top = variant.golden(WIDTH), PlainPorts(variant.device(WIDTH))
-    _, expected = _golden_run(golden, _blocks(), stalls, resets)
+    blocks = _BLOCKS[variant.method.curve]
+    _, expected = golden_trace(
+        golden, top.block_fields, blocks, _CLOCK_LIMIT, stalls, resets, until_idle=True
+    )
     names = list(golden.outputs(golden.reset()))
-    text = verilog(top, "line")
+    text = verilog(top, "device")
     try:
         trace = run_foreign(
-            text, "line", top, simulator, _blocks(), len(expected), stalls, resets=resets
+            text, "device", top, simulator, blocks, len(expected), stalls, resets=resets
         )
     except UnknownOutputError as error:
         return str(error)

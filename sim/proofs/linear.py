@@ -78,7 +78,7 @@ class _Registers:
         outputs = golden.outputs(self.state)
         free = negate(outputs["steps_valid"]) | self.inputs["steps_ready"]
         self.waiting = outputs["steps_valid"] == 1
-        self.fault = self.state["fault"] == 1
+        self.fault = self.state["fault"] != 0
         self.empty = z3.And([self.state[f"delta_{a}"] == 0 for a in golden.letters])
         self.nothing = z3.Or(self.fault, self.empty)
         self.start = z3.And(
@@ -127,8 +127,12 @@ class _Registers:
             # УУ runs exactly while steps are left to be summed.
             (state["running"] == 1) == some_left,
             # A prepared block is rejected exactly when an axis is too long.
-            (state["fault"] == 1)
-            == z3.Or([_magnitude(axis.next_end - axis.start) >= self.modulus for axis in axes]),
+            state["fault"]
+            == z3.If(
+                z3.Or([_magnitude(axis.next_end - axis.start) >= self.modulus for axis in axes]),
+                z3.BitVecVal(1, self.wide),
+                z3.BitVecVal(0, self.wide),
+            ),
             self.scaled(axes),
         ]
         for axis in axes:

@@ -5,22 +5,25 @@ from amaranth.lib import data
 from discreta.hdl.contract import (
     AXIS_LETTERS,
     MAX_AXES,
+    MAX_GUARD,
     MAX_WIDTH,
     MIN_AXES,
     MIN_WIDTH,
     ErrorCode,
     check_axes,
     check_choice,
+    check_flag,
+    check_guard,
     check_width,
     point_layout,
     register_names,
     step_layout,
 )
-from tests.hdl.parts.clocked import BAD_AXES, BAD_WIDTHS, assert_refused
+from tests.hdl.parts.clocked import BAD_AXES, BAD_GUARDS, BAD_WIDTHS, assert_refused
 
 
 def test_limits():
-    assert (MIN_WIDTH, MAX_WIDTH, MIN_AXES, MAX_AXES) == (4, 32, 2, 6)
+    assert (MIN_WIDTH, MAX_WIDTH, MIN_AXES, MAX_AXES, MAX_GUARD) == (4, 32, 2, 6, 4)
     assert AXIS_LETTERS == "xyzabc"
 
 
@@ -28,8 +31,9 @@ def test_error_codes():
     assert {name: code.value for name, code in ErrorCode.__members__.items()} == {
         "NONE": 0,
         "RANGE": 1,
+        "OFF_CURVE": 2,
     }
-    assert Shape.cast(ErrorCode) == unsigned(1)
+    assert Shape.cast(ErrorCode) == unsigned(2)
 
 
 @pytest.mark.parametrize("width", range(4, 33))
@@ -58,6 +62,24 @@ def test_refuses_width(width, error, message):
 @pytest.mark.parametrize(("axes", "error", "message"), BAD_AXES)
 def test_refuses_axes(axes, error, message):
     assert_refused((error, message), check_axes, axes)
+
+
+@pytest.mark.parametrize("guard", range(5))
+def test_accepts_guard(guard):
+    check_guard(guard)
+
+
+@pytest.mark.parametrize(("guard", "error", "message"), BAD_GUARDS)
+def test_refuses_guard(guard, error, message):
+    assert_refused((error, message), check_guard, guard)
+
+
+def test_flag():
+    check_flag("hot", True)
+    check_flag("hot", False)
+    for value in (0, 1, "yes", None):
+        message = f"hot must be True or False, not {value!r}"
+        assert_refused((TypeError, message), check_flag, "hot", value)
 
 
 def test_choice():

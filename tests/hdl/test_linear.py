@@ -9,6 +9,7 @@ from discreta.sim.golden.linear import Linear as GoldenLinear
 from discreta.sim.interpreted import PysimModel
 from discreta.sim.stalls import NO_STALLS, Stalls
 from tests.hdl.parts.clocked import BAD_AXES, BAD_WIDTHS, assert_refused
+from tests.hdl.traces import golden_trace
 
 VARIANTS = [(normalize, preload) for normalize in (True, False) for preload in ("zero", "half")]
 STALLS = [NO_STALLS, Stalls(1, stall=0.5, gap=0.3), Stalls(2, stall=0.9), Stalls(3, gap=0.9)]
@@ -17,23 +18,6 @@ CLOCK, ACCEPTED, DONE, ERROR, TAKEN = range(5)
 
 def watched(golden):
     return tuple(f"reg_{name}" for name in golden.registers())
-
-
-def golden_trace(golden, fields, blocks, stalls, clocks):
-    """Run the golden model under the same handshakes as the engines."""
-    state, fed, offering, rows = golden.reset(), 0, False, []
-    for clock in range(clocks):
-        rows.append([state[name] for name in golden.registers()])
-        offering = offering or (fed < len(blocks) and stalls.offers(clock))
-        offered = blocks[min(fed, len(blocks) - 1)].tolist()
-        inputs = dict(zip(fields, offered, strict=True))
-        inputs |= {"blocks_valid": int(offering), "steps_ready": int(stalls.ready(clock))}
-        if offering and golden.outputs(state)["blocks_ready"]:
-            fed, after_offer = fed + 1, False
-        else:
-            after_offer = offering
-        state, offering = golden.step(state, inputs), after_offer
-    return np.array(rows)
 
 
 def random_blocks(width, axes, count, seed):
@@ -58,7 +42,7 @@ def test_every_register_at_every_clock_in_pysim(width, axes, normalize, preload,
     blocks = random_blocks(width, axes, 12, seed=width)
     seen = model.run(blocks, 6000, until_answered=len(blocks), stalls=stalls, event_room=6000)
     assert (seen.fed, seen.answered) == (12, 12)
-    expected = golden_trace(golden, model.block_fields, blocks, stalls, seen.ran)
+    expected, _ = golden_trace(golden, model.block_fields, blocks, seen.ran, stalls)
     assert np.argwhere(seen.watch != expected).tolist() == []
 
 
@@ -75,7 +59,7 @@ def test_every_register_at_every_clock_compiled(width, axes, stalls):
         blocks[1] = [-(2**32), 0, 2**32 - 1, 5]
     seen = model.run(blocks, 60_000, until_answered=25, stalls=stalls, event_room=60_000)
     assert (seen.fed, seen.answered) == (25, 25)
-    expected = golden_trace(golden, model.block_fields, blocks, stalls, seen.ran)
+    expected, _ = golden_trace(golden, model.block_fields, blocks, seen.ran, stalls)
     assert np.argwhere(seen.watch != expected).tolist() == []
 
 

@@ -1,11 +1,12 @@
 import pytest
 from amaranth import signed, unsigned
 
+from discreta.hdl.circular import Circular
 from discreta.hdl.linear import Linear
 from discreta.hdl.plain import PlainPorts
 from tests.hdl.parts.clocked import run
 
-BIT = unsigned(1)
+BIT, CODE = unsigned(1), unsigned(2)
 # The end of the block drawn below, by axis letter; it starts at the origin.
 END = {"x": 5, "y": -3, "z": 1}
 
@@ -53,7 +54,7 @@ def test_ports(letters):
         *((f"position_{a}", coordinate) for a in letters),
         ("busy", BIT),
         ("done", BIT),
-        ("error", BIT),
+        ("error", CODE),
     ]
     assert shapes(top.inputs) == inputs
     assert shapes(top.outputs) == outputs
@@ -69,6 +70,57 @@ def test_ports(letters):
         assert (moves, done) == ({a: END[a] for a in letters}, 1)
         for letter in letters:
             assert ctx.get(top.outputs[f"position_{letter}"]) == END[letter]
+
+    run(top, bench)
+
+
+def test_ports_of_the_circular():
+    top = PlainPorts(Circular(8), observe=True)
+    coordinate, move = signed(9), signed(2)
+    fields = [
+        *((f"{point}_{a}", coordinate) for point in ("start", "end", "center") for a in "xy"),
+        ("clockwise", BIT),
+        ("full_turns", unsigned(8)),
+    ]
+    assert shapes(top.inputs) == [
+        *((f"blocks_{name}", shape) for name, shape in fields),
+        ("blocks_valid", BIT),
+        ("steps_ready", BIT),
+    ]
+    outputs = shapes(top.outputs)
+    registers = {name: register.shape() for name, register in top.core.registers.items()}
+    assert outputs[:10] == [
+        ("blocks_ready", BIT),
+        *((f"steps_{a}", move) for a in "xy"),
+        ("steps_last", BIT),
+        ("steps_valid", BIT),
+        *((f"position_{a}", coordinate) for a in "xy"),
+        ("busy", BIT),
+        ("done", BIT),
+        ("error", CODE),
+    ]
+    assert dict(outputs[10:]) == {f"reg_{name}": shape for name, shape in registers.items()}
+    assert len(outputs) == 10 + len(registers)
+    assert top.block_fields == tuple(f"blocks_{name}" for name, _ in fields)
+    assert top.step_fields == ("steps_x", "steps_y", "steps_last")
+
+    async def bench(ctx):
+        # A quarter from the origin around (3, 0), clockwise.
+        for name, value in (("end_x", 3), ("end_y", 3), ("center_x", 3), ("clockwise", 1)):
+            ctx.set(top.inputs[f"blocks_{name}"], value)
+        ctx.set(top.steps_ready, 1)
+        ctx.set(top.blocks_valid, 1)
+        moves, done = [0, 0], 0
+        for _ in range(70):
+            if ctx.get(top.steps_valid):
+                moves[0] += ctx.get(top.steps_x)
+                moves[1] += ctx.get(top.steps_y)
+            done += ctx.get(top.done)
+            assert ctx.get(top.reg_xt) == ctx.get(top.position_x)
+            await ctx.tick()
+            ctx.set(top.blocks_valid, 0)
+        assert (moves, done) == ([3, 3], 1)
+        assert (ctx.get(top.reg_p1), ctx.get(top.reg_p2)) == (0, 3)
 
     run(top, bench)
 

@@ -9,25 +9,47 @@ from pathlib import Path
 import pytest
 
 import discreta
+from discreta.hdl.circular import Circular
 from discreta.hdl.linear import Linear
 from discreta.hdl.plain import PlainPorts
 from discreta.hdl.verilog import verilog
+from discreta.sim.golden.circular import Circular as GoldenCircular
 from discreta.sim.golden.linear import Linear as GoldenLinear
 
-PARAMETERS = {"width": 8, "axes": 2, "normalize": True, "preload": "half"}
+METHODS = ["linear", "circular"]
+HANDSHAKE = ["input wire blocks_valid", "input wire steps_ready"]
+POINTS = {"linear": ("start", "end"), "circular": ("start", "end", "center")}
+OUTPUTS = [
+    "output wire blocks_ready",
+    "output wire signed [1:0] steps_x",
+    "output wire signed [1:0] steps_y",
+    "output wire steps_last",
+    "output wire steps_valid",
+    "output wire signed [8:0] position_x",
+    "output wire signed [8:0] position_y",
+    "output wire busy",
+    "output wire done",
+    "output wire [1:0] error",
+]
+
+
+def make(method: str):
+    return Linear(8, 2) if method == "linear" else Circular(8)
 
 
 @cache
-def emit() -> str:
-    return verilog(Linear(8, 2), "discreta_linear")
+def emit(method: str) -> str:
+    return verilog(make(method), f"discreta_{method}")
 
 
 def test_same_bytes_in_every_folder_and_for_every_hash_seed(tmp_path):
     program = (
         "import sys\n"
+        "from discreta.hdl.circular import Circular\n"
         "from discreta.hdl.linear import Linear\n"
         "from discreta.hdl.verilog import verilog\n"
         "text = verilog(Linear(8, 2), 'discreta_linear')\n"
+        "text += verilog(Circular(8), 'discreta_circular')\n"
         "sys.stdout.buffer.write(text.encode())\n"
     )
     root = str(Path(discreta.__file__).parents[1])
@@ -37,37 +59,29 @@ def test_same_bytes_in_every_folder_and_for_every_hash_seed(tmp_path):
         done = subprocess.run(
             command, cwd=folder, env=environment, capture_output=True, timeout=100, check=True
         )
-        assert done.stdout == emit().encode()
+        assert done.stdout == "".join(map(emit, METHODS)).encode()
 
 
-def test_twice_from_one_core():
-    top = PlainPorts(Linear(8, 2))
-    assert [verilog(top, "discreta_linear") for _ in range(2)] == [emit()] * 2
-    assert verilog(top.core, "discreta_linear") == emit()
+@pytest.mark.parametrize("method", METHODS)
+def test_twice_from_one_core(method):
+    top = PlainPorts(make(method))
+    assert [verilog(top, f"discreta_{method}") for _ in range(2)] == [emit(method)] * 2
+    assert verilog(top.core, f"discreta_{method}") == emit(method)
 
 
-def test_ports_of_the_top_module():
-    header = re.search(r"^module discreta_linear \((.*?)\);", emit(), re.MULTILINE | re.DOTALL)
+@pytest.mark.parametrize("method", METHODS)
+def test_ports_of_the_top_module(method):
+    pattern = rf"^module discreta_{method} \((.*?)\);"
+    header = re.search(pattern, emit(method), re.MULTILINE | re.DOTALL)
     assert header is not None
+    direction = ["input wire blocks_clockwise", "input wire [7:0] blocks_full_turns"]
     assert [line.strip() for line in header[1].split(",")] == [
         "input wire clk",
         "input wire rst",
-        "input wire signed [8:0] blocks_start_x",
-        "input wire signed [8:0] blocks_start_y",
-        "input wire signed [8:0] blocks_end_x",
-        "input wire signed [8:0] blocks_end_y",
-        "input wire blocks_valid",
-        "input wire steps_ready",
-        "output wire blocks_ready",
-        "output wire signed [1:0] steps_x",
-        "output wire signed [1:0] steps_y",
-        "output wire steps_last",
-        "output wire steps_valid",
-        "output wire signed [8:0] position_x",
-        "output wire signed [8:0] position_y",
-        "output wire busy",
-        "output wire done",
-        "output wire error",
+        *(f"input wire signed [8:0] blocks_{point}_{a}" for point in POINTS[method] for a in "xy"),
+        *(direction if method == "circular" else []),
+        *HANDSHAKE,
+        *OUTPUTS,
     ]
 
 
@@ -91,6 +105,10 @@ def test_hierarchy_and_registers(width, axes):
     assert sorted(instances) == sorted(
         (module, f"u_{module.removeprefix('line_')}") for module in modules if module != "line"
     )
+    assert_registers(text, golden)
+
+
+def assert_registers(text, golden):
     reset = golden.reset()
     for name, (bits, _) in golden.registers().items():
         size = rf" \[{bits - 1}:0\]" if bits > 1 else ""
@@ -98,33 +116,92 @@ def test_hierarchy_and_registers(width, axes):
         assert int(value, {"h": 16, "d": 10}[base]) == reset[name], name
 
 
-def test_identifiers_are_plain():
-    text = emit()
+@pytest.mark.parametrize(
+    ("width", "order", "normalize", "preload", "guard"),
+    [
+        (4, "simultaneous", True, "half", 4),
+        (5, "alternated", False, "half", 0),
+        (16, "simultaneous", False, "zero", 0),
+        (32, "alternated", True, "zero", 1),
+    ],
+)
+def test_hierarchy_and_registers_of_the_circular(width, order, normalize, preload, guard):
+    options = {"order": order, "normalize": normalize, "preload": preload, "guard": guard}
+    text = verilog(Circular(width, **options), "arc")
+    registers = [f"{name}_register" for name in ("p1", "p2", "xt", "yt", "xk", "yk", "limit")]
+    parts = [*registers, "p3_counter", "p4_counter", "sx_summator", "sy_summator"]
+    parts += ["core", "input", "input_meter", "output", "uu", *["normalizer"] * normalize]
+    modules = re.findall(r"^module (\w+) \($", text, re.MULTILINE)
+    assert sorted(modules) == sorted(["arc", *(f"arc_{part}" for part in parts)])
+    instances = re.findall(r"^  (\w+) (\w+)\($", text, re.MULTILINE)
+    assert sorted(instances) == sorted(
+        (f"arc_{part}", f"u_{part.removeprefix('input_')}") for part in parts
+    )
+    assert_registers(text, GoldenCircular(width, **options))
+    assert_plain(text)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_read_of_a_register_has_its_name(method):
+    for register in ("p1", "p2", *(("sx", "sy", "xk", "yk") if method == "circular" else ())):
+        assert re.search(rf"^    \.{register}\({register}\)", emit(method), re.MULTILINE)
+
+
+def test_what_a_linear_summator_starts_from_is_a_constant():
+    summators = re.findall(r"^module \w+_summator .*?^endmodule", emit("linear"), re.M | re.S)
+    assert len(summators) == 2
+    assert "initial" not in "".join(summators)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_identifiers_are_plain(method):
+    assert_plain(emit(method))
+
+
+def assert_plain(text):
     assert "\\" not in text
     assert re.findall(r"\w*\$\w+", text.replace("$signed(", "")) == []
-    assert "'hx" not in text
+    assert re.findall(r"'[bdh]\w*[xz]", text) == []
 
 
-def test_comment_at_the_top():
-    lines = [line for line in emit().splitlines() if line.startswith("//")]
-    assert emit().startswith("\n".join(lines))
+BEGINS = {
+    "linear": "discreta_linear: Draws a straight line by summation of the increments; ",
+    "circular": "discreta_circular: Draws an arc: each coordinate is summed to move the other; ",
+}
+PARAMETERS = {
+    "linear": "width = 8, axes = 2, normalize = True, preload = half (n = width, M = 2^n).",
+    "circular": "width = 8, order = alternated, normalize = True, preload = half, guard = 2 "
+    "(n = width, g = guard, M = 2^(n + g)).",
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_comment_at_the_top(method):
+    lines = [line for line in emit(method).splitlines() if line.startswith("//")]
+    assert emit(method).startswith("\n".join(lines))
     comment = " ".join(line.removeprefix("//").strip() for line in lines)
-    assert comment.startswith("discreta_linear: Draws a straight line by summation")
-    assert "Parameters: width = 8, axes = 2, normalize = True, preload = half " in comment
+    assert comment.startswith(BEGINS[method])
+    assert f"Parameters: {PARAMETERS[method]} " in comment
     assert f"Generated by discreta {metadata.version('discreta')};" in comment
     for word in ("Latency: ", "Throughput: ", "blocks_valid and blocks_ready"):
         assert word in comment
-    rows = dict(line.removeprefix("// ").split(maxsplit=1) for line in lines[-18:])
-    top = PlainPorts(Linear(8, 2))
-    verilog(top, "discreta_linear")
-    assert list(rows) == ["clk", "rst", *top.inputs, *top.outputs]
+    top = PlainPorts(make(method))
+    verilog(top, f"discreta_{method}")
+    names = ["clk", "rst", *top.inputs, *top.outputs]
+    rows = dict(line.removeprefix("// ").split(maxsplit=1) for line in lines[-len(names) :])
+    assert list(rows) == names
     assert rows["blocks_end_y"].split() == ["input", "9", "signed", "block:", "end", "y"]
     assert rows["steps_valid"].split()[:2] == ["output", "1"]
-    assert rows["error"].endswith("0 NONE, 1 RANGE")
+    assert rows["error"].endswith("why a block was not run; 0 NONE, 1 RANGE, 2 OFF_CURVE")
+    if method == "circular":
+        assert rows["blocks_center_x"].endswith("signed   block: center x")
+        assert rows["blocks_clockwise"].endswith("block: 1 runs clockwise, 0 counter-clockwise")
+        assert rows["blocks_full_turns"].endswith("block: whole turns made before the arc itself")
 
 
-def test_text_names_no_machine_and_reads_anywhere():
-    text = emit()
+@pytest.mark.parametrize("method", METHODS)
+def test_text_names_no_machine_and_reads_anywhere(method):
+    text = emit(method)
     assert text.isascii()
     assert text.endswith("endmodule\n")
     assert [line for line in text.splitlines() if line != line.rstrip()] == []

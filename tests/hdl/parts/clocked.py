@@ -25,6 +25,12 @@ BAD_AXES = [
     ("xy", TypeError, "number of axes must be a whole number from 2 to 6, not 'xy'"),
     (True, TypeError, "number of axes must be a whole number from 2 to 6, not True"),
 ]
+BAD_GUARDS = [
+    (-1, ValueError, "number of guard bits is -1: choose a whole number from 0 to 4"),
+    (5, ValueError, "number of guard bits is 5: choose a whole number from 0 to 4"),
+    (1.0, TypeError, "number of guard bits must be a whole number from 0 to 4, not 1.0"),
+    (False, TypeError, "number of guard bits must be a whole number from 0 to 4, not False"),
+]
 
 
 def run(part: Part, bench: Callable[[Any], Awaitable[None]]) -> None:

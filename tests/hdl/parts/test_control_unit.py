@@ -72,15 +72,16 @@ def test_a_block_of_two_steps():
 
 
 @pytest.mark.parametrize("empty", [0, 1])
-def test_a_faulty_block_is_dropped_with_an_error(empty):
+@pytest.mark.parametrize("code", [ErrorCode.RANGE, ErrorCode.OFF_CURVE])
+def test_a_faulty_block_is_dropped_with_an_error(code, empty):
     part = ControlUnit()
 
     async def bench(ctx):
-        give(ctx, part, pending=1, fault=ErrorCode.RANGE, empty=empty)
+        give(ctx, part, pending=1, fault=code, empty=empty)
         assert get(ctx, part, "start load done error") == [1, 0, 0, ErrorCode.NONE]
         await ctx.tick()
         give(ctx, part)
-        assert get(ctx, part, "clock idle done error") == [0, 1, 0, ErrorCode.RANGE]
+        assert get(ctx, part, "clock idle done error") == [0, 1, 0, code]
         await ctx.tick()
         assert get(ctx, part, "clock idle done error") == [0, 1, 0, ErrorCode.NONE]
 

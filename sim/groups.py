@@ -1,0 +1,279 @@
+"""Which blocks are surveyed: all there are of a kind, or a seeded sample of them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil, pi, sqrt
+
+import numpy as np
+
+from discreta.hdl.contract import MIN_WIDTH
+from discreta.sim.arcs import refusals, seen_from_center, swept
+from discreta.sim.methods import Method
+
+__all__ = ["SAMPLE_BUDGET", "SEED", "WHOLE_BUDGET", "Group", "survey_groups", "whole_degrees"]
+
+SEED = 1970
+
+#: Summations that all blocks of a group may take in the slowest variant; if they would take more, a
+#: sample of them is run, which takes so many.
+WHOLE_BUDGET, SAMPLE_BUDGET = 1 << 29, 1 << 25
+
+#: A width in whose sample there would be fewer lines, or quarter arcs, has no survey.
+_FEWEST = 64
+
+#: Lines of a sample, arcs of a sample, and circles that are run ten times round.
+_LINES, _ARCS, _TEN_TURNS = 1 << 16, 1 << 10, 32
+
+#: Radii of the arcs between whole degrees, in steps; of those all round every so manieth is run.
+_RADII, _STRIDE = range(2, 200, 3), 1999
+
+
+@dataclass(frozen=True)
+class Group:
+    """Blocks that are surveyed together.
+
+    Attributes
+    ----------
+    title : str
+        How many of what: ``"all 255 quarter arcs"``.
+    blocks : array of int64, shape (blocks, block fields)
+    answers : array of int64, shape (blocks,)
+        What each must be answered: 0 for ``done``, else the code of ``error``.
+    lengths : array of float, shape (blocks,)
+        Steps of the axis that moves faster: of a line the longer one, of an arc in every octant the
+        one of the smaller coordinate. 0 for a block that is refused.
+    """
+
+    title: str
+    blocks: np.ndarray
+    answers: np.ndarray
+    lengths: np.ndarray
+
+
+def survey_groups(method: Method, width: int) -> list[Group]:
+    """Choose the groups of a survey.
+
+    Lines: of every pair of lengths there is, quadrant and start point drawn from the seed. Arcs:
+    counter-clockwise about the origin all quarter arcs from (R, 0) to (0, R), all circles from (R,
+    0) and ten turns of some of them, evenly spread; and a sample of arcs of any radius, center,
+    start, end and direction. A group that would take more than :data:`WHOLE_BUDGET` summations is a
+    sample that takes up to :data:`SAMPLE_BUDGET`.
+
+    Raises
+    ------
+    ValueError
+        A single block of this width takes too many clocks.
+    """
+    return _line_groups(width) if method.curve == "line" else _arc_groups(method, width)
+
+
+def _room(width: int, name: str, summations: Callable[[int], int]) -> int:
+    """Give how many blocks that take so many summations a sample has room for."""
+
+    def room(width: int) -> int:
+        return SAMPLE_BUDGET // summations(width)
+
+    if room(width) < _FEWEST:
+        largest = max(w for w in range(MIN_WIDTH, width) if room(w) >= _FEWEST)
+        raise ValueError(
+            f"width {width} is too large to survey: one {name} takes up to {summations(width)} "
+            f"clocks; choose a width up to {largest}"
+        )
+    return room(width)
+
+
+def _room_for_quarters(method: Method, width: int) -> int:
+    """Give how many quarter arcs a sample has room for."""
+    guard = max(method.choices["guard"])
+    return _room(width, "quarter arc", lambda width: ceil(pi / 2 * 2 ** (width + guard)))
+
+
+def _how_many(chosen: int, count: int, what: str) -> str:
+    return f"{'all' if chosen == count else f'a sample (seed {SEED}) of'} {chosen} {what}"
+
+
+def _line_groups(width: int) -> list[Group]:
+    modulus = 1 << width
+    room = _room(width, "line", lambda width: 1 << width)
+    random = np.random.default_rng(SEED)
+    if modulus**3 <= WHOLE_BUDGET:
+        lengths = np.stack(np.divmod(np.arange(modulus**2), modulus), axis=1)
+    else:
+        lengths = random.integers(0, modulus, (min(_LINES, room), 2))
+    signs = random.choice((-1, 1), lengths.shape)
+    low = np.where(signs < 0, lengths, 0) - modulus
+    high = np.where(signs > 0, -lengths, 0) + modulus - 1
+    starts = random.integers(low, high, endpoint=True)
+    blocks = np.concatenate([starts, starts + signs * lengths], axis=1)
+    # The line of no length last, behind one that moves.
+    blocks, lengths = np.roll(blocks, -1, axis=0), np.roll(lengths, -1, axis=0)
+    return [
+        Group(
+            _how_many(len(blocks), modulus**2, "lines"),
+            blocks,
+            np.zeros(len(blocks), dtype=np.int64),
+            lengths.max(axis=1).astype(float),
+        )
+    ]
+
+
+def _arc_groups(method: Method, width: int) -> list[Group]:
+    room = _room_for_quarters(method, width)
+    top = (1 << width) - 1
+    quarters = _pick(np.arange(1, top + 1), room)
+    # A circle's axes may rise to R + 1.
+    circles = _pick(np.arange(1, top), room // 4)
+    spread = np.linspace(1, top - 1, min(_TEN_TURNS, room // 40, top - 1)).round()
+    arcs = _random_arcs(width, min(_ARCS, room // 2))
+    return [
+        _arc_group(title, blocks, width)
+        for title, blocks in (
+            (_how_many(len(quarters), top, "quarter arcs"), _about_origin(quarters, quarter=True)),
+            (_how_many(len(circles), top - 1, "circles"), _about_origin(circles)),
+            (f"ten turns of {len(spread)} circles", _about_origin(spread, full_turns=9)),
+            (f"a sample (seed {SEED}) of {len(arcs)} arcs", arcs),
+        )
+    ]
+
+
+def _pick(candidates: np.ndarray, room: int) -> np.ndarray:
+    """Choose all, or where they would take too long a sample with this room, in their order."""
+    if len(candidates) <= room * (WHOLE_BUDGET // SAMPLE_BUDGET):
+        return candidates
+    return np.sort(np.random.default_rng(SEED).choice(candidates, room, replace=False))
+
+
+def _arc_group(title: str, blocks: np.ndarray, width: int) -> Group:
+    answers = refusals(blocks, width)
+    return Group(title, blocks, answers, np.where(answers == 0, _faster_steps(blocks), 0.0))
+
+
+def _radius(blocks: np.ndarray) -> np.ndarray:
+    start, _ = seen_from_center(blocks)
+    return np.hypot(*start.T.astype(float))
+
+
+def _faster_steps(blocks: np.ndarray) -> np.ndarray:
+    """Give the steps of the axis that moves faster: R·∫max(|cos φ|, |sin φ|) dφ."""
+    start, _ = seen_from_center(blocks)
+    begin = np.arctan2(start[:, 1] * np.where(blocks[:, 6] == 1, -1, 1), start[:, 0])
+
+    def integral(angle: np.ndarray) -> np.ndarray:
+        quarters, rest = np.divmod(angle, pi / 2)
+        part = np.where(rest < pi / 4, np.sin(rest), sqrt(2) - np.cos(rest))
+        return quarters * sqrt(2) + part
+
+    angle = np.radians(np.abs(swept(blocks)))
+    return _radius(blocks) * (integral(begin + angle) - integral(begin))
+
+
+def _about_origin(radii: np.ndarray, *, quarter: bool = False, full_turns: int = 0) -> np.ndarray:
+    """Give quarter arcs or circles of these radii about the origin, counter-clockwise."""
+    blocks = np.zeros((len(radii), 8), dtype=np.int64)
+    blocks[:, 0] = radii
+    blocks[:, 3 if quarter else 2] = radii
+    blocks[:, 7] = full_turns
+    return blocks
+
+
+def _random_arcs(width: int, count: int) -> np.ndarray:
+    """Draw arcs that are not refused, ends nearest to the circle of the start."""
+    modulus = 1 << width
+    random = np.random.default_rng(SEED)
+    chosen = np.empty((0, 8), dtype=np.int64)
+    while len(chosen) < count:
+        angles = random.uniform(0, 2 * pi, (2, 2 * count))
+        radius = random.uniform(1, modulus, 2 * count)
+        center = random.integers(-modulus, modulus, (2 * count, 2))
+        blocks = np.zeros((2 * count, 8), dtype=np.int64)
+        for column, angle in zip((0, 2), angles, strict=True):
+            point = np.rint(radius * [np.cos(angle), np.sin(angle)]).T
+            blocks[:, column : column + 2] = center + point
+            radius = np.hypot(*point.T)
+        blocks[:, 4:6] = center
+        blocks[:, 6] = random.integers(0, 2, 2 * count)
+        inside = np.all((blocks[:, :4] >= -modulus) & (blocks[:, :4] < modulus), axis=1)
+        inside[inside] = refusals(blocks[inside], width) == 0
+        chosen = np.concatenate([chosen, blocks[inside]])
+    return chosen[:count]
+
+
+def whole_degrees(method: Method, width: int) -> list[Group]:
+    """Choose the arcs between the lattice points nearest to whole degrees of 66 circles.
+
+    The radii are 2, 5, … 197 steps, the center is the origin; halves are rounded outwards. In
+    quadrant I all pairs of degrees, 0 to 90, with two points; the same arcs turned and mirrored,
+    each to the next of its seven images; and of the arcs from every degree by 1 to 360 degrees in
+    both directions every 1999th. An end may be more than one step off the circle of the start: then
+    it must be refused.
+
+    Raises
+    ------
+    ValueError
+        The method draws no arcs, the width has no room for the circles, or takes too many clocks.
+    """
+    if method.curve != "arc":
+        raise ValueError(f"there are no {method.curve}s between whole degrees: survey circular")
+    far = _RADII[-1] + 1
+    if far >= 1 << width:
+        raise ValueError(
+            f"the arcs between whole degrees go up to {far} steps from their center: width {width} "
+            f"has room for {(1 << width) - 1}; choose a width from {far.bit_length()}"
+        )
+    room = _room_for_quarters(method, width)
+    points = _degree_points()
+    first = _first_quadrant(points)
+    groups = []
+    for what, blocks in (
+        ("arcs in quadrant I, counter-clockwise", first),
+        ("of these arcs, turned to all quadrants and directions", _turned(first)),
+        (f"arcs all round, every {_STRIDE}th there is", _all_round(points)),
+    ):
+        group = _arc_group("", blocks, width)
+        right_angles = group.lengths / (sqrt(2) * _radius(blocks))
+        chosen = _pick(np.arange(len(blocks)), int(room / right_angles.mean()))
+        title = _how_many(len(chosen), len(blocks), what)
+        groups.append(Group(title, blocks[chosen], group.answers[chosen], group.lengths[chosen]))
+    return groups
+
+
+def _degree_points() -> np.ndarray:
+    """Give the lattice points nearest to whole degrees, shape (radii, 360, 2)."""
+    angles = np.radians(np.arange(90))
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    # R·cos 60° is half a step for every odd R, or a little less by the rounding of the cosine.
+    points = np.floor(np.array(_RADII)[:, None, None] * circle + (0.5 + 1e-9)).astype(np.int64)
+    quadrants = [points]
+    for _ in range(3):
+        quadrants.append(quadrants[-1][..., ::-1] * [-1, 1])
+    return np.concatenate(quadrants, axis=1)
+
+
+def _first_quadrant(points: np.ndarray) -> np.ndarray:
+    begin, end = np.triu_indices(91, 1)
+    blocks = np.zeros((len(points), len(begin), 8), dtype=np.int64)
+    blocks[..., 0:2], blocks[..., 2:4] = points[:, begin], points[:, end]
+    return blocks[np.any(blocks[..., 0:2] != blocks[..., 2:4], axis=-1)]
+
+
+def _turned(blocks: np.ndarray) -> np.ndarray:
+    """Turn and mirror arcs about the origin, each to the next of the seven images that it has."""
+    image = 1 + np.arange(len(blocks)) % 7
+    turned = blocks.copy()
+    turned[:, 6] = image // 4
+    turned[:, 1:4:2] *= np.where(image < 4, 1, -1)[:, None]
+    for _ in range(3):
+        image, turn = np.where(image % 4, image - 1, image), image % 4 > 0
+        for x in (0, 2):
+            turned[turn, x : x + 2] = turned[turn, x : x + 2][:, ::-1] * [-1, 1]
+    return turned
+
+
+def _all_round(points: np.ndarray) -> np.ndarray:
+    shape = (len(points), 360, 360, 2)
+    radius, begin, sweep, clockwise = np.unravel_index(np.arange(0, np.prod(shape), _STRIDE), shape)
+    end = begin + (1 + sweep) * np.where(clockwise, -1, 1)
+    blocks = np.zeros((len(radius), 8), dtype=np.int64)
+    blocks[:, 0:2], blocks[:, 2:4] = points[radius, begin], points[radius, end % 360]
+    blocks[:, 6] = clockwise
+    return blocks[(sweep == 359) | np.any(blocks[:, 0:2] != blocks[:, 2:4], axis=1)]
