@@ -225,6 +225,20 @@ def _chosen(method: Method, setting: str, given: dict[str, Any]) -> dict[str, An
     return choices
 
 
+_one_setting = click.option(
+    "--setting",
+    metavar="NAME",
+    help="One setting alone, default or lecture. [default: every combination of the options]",
+)
+
+
+def _variants(method: Method, setting: str | None) -> list[dict[str, Any]]:
+    """Give the variants of a method, or of them the one that is a setting."""
+    if setting is None:
+        return method.variants()
+    return [_chosen(method, setting, {})]
+
+
 class _Commands(click.Group):
     """Commands whose standard output may end before they do."""
 
@@ -419,23 +433,28 @@ def verilog(method: Method, width: int, axes: int, setting: str, output: str, **
 @cli.command(short_help="Prove that the RTL equals its model and keeps its promises.")
 @click.argument("methods", type=_MethodName(), nargs=-1, required=True, metavar="METHOD...")
 @_width
-def prove(methods: tuple[Method, ...], width: int) -> None:
+@_one_setting
+def prove(methods: tuple[Method, ...], width: int, setting: str | None) -> None:
     """Prove a method: RTL = golden model, and its promises, for every block of a width.
 
-    All options of the method are proven, in the plane; what they share is proven once. What is
-    marked as checked was run in every case there is, which it names. Exits 1 when something does
-    not hold, with the values that break it.
+    Every combination of the method's options is proven, in the plane; what they share is proven
+    once. What is marked as checked was run in every case there is, which it names. Exits 1 when
+    something does not hold, with the values that break it.
 
     Example: discreta prove linear --width 32
     """
     try:
-        from discreta.sim.prover import parts, prove_variant
+        from discreta.sim.prover import prove_variant, shares
     except ModuleNotFoundError as error:
         raise BadInputError(
             f"proofs need {error.name}: install the extra, pip install 'discreta[prove]'"
         ) from None
     out = Console(highlight=False, soft_wrap=True)
-    jobs = [(method, variant) for method in methods for variant in parts(method.name)]
+    jobs = [
+        (method, variant)
+        for method in methods
+        for variant in [*([None] if shares(method.name) else []), *_variants(method, setting)]
+    ]
     good = True
     began = time.perf_counter()
     count = {"proven": 0, "checked": 0}
@@ -474,11 +493,7 @@ def prove(methods: tuple[Method, ...], width: int) -> None:
 @cli.command("survey", short_help="Run every block there is and compare every register.")
 @click.argument("method", type=_MethodName())
 @_width_option(8)
-@click.option(
-    "--setting",
-    metavar="NAME",
-    help="One setting alone, default or lecture. [default: every combination of the options]",
-)
+@_one_setting
 @click.option(
     "--whole-degrees",
     is_flag=True,
@@ -500,10 +515,7 @@ def survey_command(method: Method, width: int, setting: str | None, whole_degree
 
     if default_engine() != "compiled":
         raise BadInputError("a survey needs the compiled engine: install a C++ compiler")
-    variants = method.variants()
-    if setting is not None:
-        chosen = _chosen(method, setting, {})
-        variants = [variant for variant in variants if variant == chosen]
+    variants = _variants(method, setting)
     try:
         choose = choice.whole_degrees if whole_degrees else choice.survey_groups
         groups = choose(method, width)

@@ -6,13 +6,12 @@ from typing import Any
 from discreta.sim.methods import METHODS
 from discreta.sim.smt import Verdict, check, equivalence
 
-__all__ = ["parts", "prove_variant"]
+__all__ = ["prove_variant", "shares"]
 
 
-def parts(name: str) -> list[dict[str, Any] | None]:
-    """Give every variant of a method, and before them None if there is something they share."""
-    shares = hasattr(import_module(f"discreta.sim.proofs.{name}"), "shared")
-    return [*([None] if shares else []), *METHODS[name].variants()]
+def shares(name: str) -> bool:
+    """Tell whether something is promised of all variants of a method alike."""
+    return hasattr(import_module(f"discreta.sim.proofs.{name}"), "shared")
 
 
 def prove_variant(name: str, width: int, variant: dict[str, Any] | None) -> list[Verdict]:

@@ -250,7 +250,7 @@ def promises(variant: Variant) -> str:
     promised += shared(device.golden) if shared else []
     return _prove(
         [
-            replace(obligation, assumptions=[*device.clocks, *obligation.assumptions])
+            device.tied(obligation)
             for obligation in promised
             # The others are about numbers, whatever the device, or run the golden model.
             if isinstance(obligation, Obligation) and not obligation.arithmetic
@@ -265,14 +265,13 @@ class _Device:
     ----------
     golden : object
         The face, of the golden model's own class.
-    clocks : list of z3.BoolRef
-        What ties together the values that the face was given and those that it gave.
     """
 
     def __init__(self, variant: Variant):
         self._core = core = variant.device(WIDTH)
         self._rtl = Rtl(core)
-        self.clocks: list[z3.BoolRef] = []
+        # What ties the values that the face was given to those that it gave.
+        self._clocks: list[list[z3.BoolRef]] = []
         model = variant.method.golden
         face = {"reset": self._reset, "step": self._step, "outputs": self._outputs}
         methods = {name: lambda _, *given, f=f: f(*given) for name, f in face.items()}
@@ -293,22 +292,41 @@ class _Device:
         rtl, given = self._rtl, state | inputs
         kinds = rtl.registers | rtl.inputs
         wide = state["running"].size()
-        number = len(self.clocks)
-        pairs = {}
-        for constant in _constants(rtl.transition):
-            name = f"{constant.decl().name()}#{number}"
-            pairs[constant.decl().name()] = (constant, z3.Const(name, constant.sort()))
-        clock = [*rtl.transition, rtl.rst == 0]
+        number = len(self._clocks)
+        own = {
+            constant.decl().name(): (constant, z3.Const(f"{constant}#{number}", constant.sort()))
+            for constant in _constants(rtl.transition)
+        }
+        clock = [z3.substitute(fact, *own.values()) for fact in [*rtl.transition, rtl.rst == 0]]
         clock += [
-            extend(z3.BitVec(name, bits), signed, wide) == given[name]
-            for name, (bits, signed) in kinds.items()
+            extend(own[name][1], signed, wide) == given[name]
+            for name, (_, signed) in kinds.items()
             if name in given
         ]
-        self.clocks.append(z3.And([z3.substitute(fact, *pairs.values()) for fact in clock]))
+        self._clocks.append(clock)
         return {
-            name: extend(pairs[symbol.format(name)][1], signed, wide)
+            name: extend(own[symbol.format(name)][1], signed, wide)
             for name, (_, signed) in wanted.items()
         }
+
+    def tied(self, obligation: Obligation) -> Obligation:
+        """Assume those clocks of the RTL of which an obligation speaks."""
+        claims = obligation.claims
+        claims = list(claims.values() if isinstance(claims, dict) else claims)
+        facts = [*obligation.assumptions, *claims]
+        clocks: dict[int, list[z3.BoolRef]] = {}
+        while (
+            new := {
+                int(name.partition("#")[2])
+                for name in (constant.decl().name() for constant in _constants(facts))
+                if "#" in name
+            }
+            - clocks.keys()
+        ):
+            clocks |= {number: self._clocks[number] for number in new}
+            facts = [fact for number in new for fact in self._clocks[number]]
+        assumptions = [fact for clock in clocks.values() for fact in clock]
+        return replace(obligation, assumptions=[*assumptions, *obligation.assumptions])
 
 
 def _constants(facts: list[z3.BoolRef]) -> list[z3.ExprRef]:
@@ -333,7 +351,9 @@ def _prove(obligations: list[Obligation]) -> str:
         # A solver that gives up has not caught anything.
         assert "gave up" not in verdict.counterexample, verdict
         if not verdict.holds:
-            return f"{verdict.title}: {verdict.counterexample}"
+            # Not the values within a clock of the RTL.
+            values = [v for v in verdict.counterexample.split(", ") if "#" not in v]
+            return f"{verdict.title}: {', '.join(values)}"
     return ""
 
 

@@ -535,6 +535,16 @@ def test_prove(discreta, monkeypatch):
     assert re.fullmatch(rf"{proven} proven, all hold, \d+\.\d s", last)
 
 
+def test_prove_one_setting(discreta):
+    code, out, err = discreta("prove", "linear", "--width", "4", "--setting", "lecture")
+    assert (code, err) == (0, "")
+    titles = [line for line in out.splitlines()[:-1] if not line.startswith("  proven ")]
+    assert titles == ["linear, width 4, no normalize, preload zero"]
+    message = "--setting textbook: choose default or lecture for linear"
+    wrong = discreta("prove", "linear", "--setting", "textbook")
+    assert wrong == (2, "", f"discreta: {message}\n")
+
+
 # --- what does not hold
 
 

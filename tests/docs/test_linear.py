@@ -5,9 +5,10 @@ from pathlib import Path
 import pytest
 
 from discreta.sim.compiled import compiler
+from discreta.sim.groups import survey_groups
 from discreta.sim.methods import METHODS
 from discreta.sim.run import say_choices
-from discreta.sim.survey import SurveyRow, survey
+from discreta.sim.survey import SurveyRow, say_worst, survey
 
 PAGE = Path(__file__).parents[2] / "docs/linear.md"
 
@@ -15,16 +16,16 @@ PAGE = Path(__file__).parents[2] / "docs/linear.md"
 @pytest.mark.skipif(compiler() is None, reason="no C++ compiler")
 def test_every_line_of_8_bits():
     method = METHODS["linear"]
-    rows = {say_choices(variant): SurveyRow(variant) for variant in method.variants()}
-    for part in survey(method, 8):
+    (lines,) = survey_groups(method, 8)
+    rows = {say_choices(variant): SurveyRow(variant, 0) for variant in method.variants()}
+    for part in survey(method, 8, [lines], method.variants()):
         rows[say_choices(part.variant)].add(part)
     page = PAGE.read_text(encoding="utf-8")
     for name, row in rows.items():
-        assert row.good, row.mismatches
-        assert row.lines == 65536
+        assert row.good, row.findings
+        assert row.blocks == 65536
         # From the design: all 8-bit lines, preload zero and half.
         assert f"{row.largest_error:.4f}" == ("0.9961" if "zero" in name else "0.7044")
-        line, at = (",".join(map(str, row.error_at[k : k + 2])) for k in (0, 2))
-        cells = [name, f"{row.largest_error:.4f}", line, at]
-        cells += [f"{row.summations / row.longest:.4f}", str(row.ends_missed)]
+        cells = [name, f"{row.largest_error:.4f}", *say_worst(method, lines, row)]
+        cells += [f"{row.summations / row.length:.4f}", str(row.ends_missed)]
         assert f"| {' | '.join(cells)} |" in page
