@@ -1,5 +1,7 @@
 """The circular interpolator: two cross-coupled summators in the first quadrant."""
 
+from typing import ClassVar
+
 from amaranth import Cat, Module, Mux, Signal, Value
 from amaranth.lib import stream
 from amaranth.lib.wiring import In, Out
@@ -121,7 +123,7 @@ class Circular(Part):
         A parameter is not one of the above.
     """
 
-    LECTURE: dict[str, object] = {
+    LECTURE: ClassVar[dict[str, object]] = {
         "order": "simultaneous",
         "normalize": False,
         "preload": "zero",

@@ -2,17 +2,20 @@
 
 A rung gives "" when the design passes, else one line that tells what it saw. Every rung is bounded:
 a dead device is caught like any other. ``python -m tests.ladder`` sends every broken variant up the
-ladder and prints what is seen, then which rungs catch which variant, as a Markdown table.
+ladder and prints what is seen, then which rungs catch which variant, as a Markdown table for every
+method.
 """
 
 import os
 import sys
 import textwrap
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import cache
 from importlib import import_module
 from itertools import product
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -199,6 +202,10 @@ def _lines() -> np.ndarray:
     return np.roll(survey_groups(METHODS["linear"], WIDTH)[0].blocks, -1, axis=0)
 
 
+#: By the kind of curve: the fields of a block.
+_FIELDS = {"line": ("start_x", "start_y", "end_x", "end_y")}
+_FIELDS["arc"] = (*_FIELDS["line"], "center_x", "center_y", "clockwise", "full_turns")
+
 #: By the kind of curve: what the documents are asked, and how they are read.
 _DOCUMENTS = {"line": (_lines(), _line_documents), "arc": (_sound_arcs(), _arc_documents)}
 
@@ -206,18 +213,27 @@ _DOCUMENTS = {"line": (_lines(), _line_documents), "arc": (_sound_arcs(), _arc_d
 _BLOCKS = {"line": _line_blocks(), "arc": _arc_blocks()}
 
 
+@cache
+def _expected(
+    golden: Any, curve: str, stalls: Stalls, resets: tuple[int, ...] = ()
+) -> tuple[np.ndarray, np.ndarray]:
+    """Give the golden registers and outputs at every clock of the blocks of a kind."""
+    fields = [f"blocks_{name}" for name in _FIELDS[curve]]
+    return golden_trace(
+        golden, fields, _BLOCKS[curve], _CLOCK_LIMIT, stalls, resets, until_idle=True
+    )
+
+
 def simulation(variant: Variant) -> str:
     """Compare every register and output at every clock in pysim, without and with stalls."""
+    curve = variant.method.curve
     for stalls in (NO_STALLS, Stalls(seed=SEED, stall=0.4, gap=0.3)):
         golden = variant.golden(WIDTH)
         names = [f"reg_{name}" for name in golden.registers()]
         names += list(golden.outputs(golden.reset()))
+        expected = np.hstack(_expected(golden, curve, stalls))
         model = PysimModel(variant.device(WIDTH), watch=tuple(names))
-        blocks = _BLOCKS[variant.method.curve]
-        expected = np.hstack(
-            golden_trace(golden, model.block_fields, blocks, _CLOCK_LIMIT, stalls, until_idle=True)
-        )
-        seen = model.run(blocks, len(expected), stalls=stalls).watch
+        seen = model.run(_BLOCKS[curve], len(expected), stalls=stalls).watch
         if finding := _difference(seen, expected, names):
             return finding
     return ""
@@ -249,18 +265,21 @@ def equivalence_by_proof(variant: Variant) -> str:
 def promises(variant: Variant) -> str:
     """Prove the promises of the device itself, in place of its golden model."""
     device = _Device(variant)
-    # What the variants of a method have in common is the shorter part.
-    shared = getattr(import_module(f"discreta.sim.proofs.{variant.method.name}"), "shared", None)
-    promised = shared(device.golden) if shared else []
-    promised += variant.method.promises(device.golden)
-    return _prove(
-        [
-            device.tied(obligation)
-            for obligation in promised
-            # The others are about numbers, whatever the device, or run the golden model.
-            if isinstance(obligation, Obligation) and not obligation.arithmetic
-        ]
-    )
+    proofs = import_module(f"discreta.sim.proofs.{variant.method.name}")
+    # What the variants of a method have in common, if anything, is the shorter part.
+    for promised in (getattr(proofs, "shared", None), proofs.promises):
+        obligations = promised(device.golden) if promised else []
+        finding = _prove(
+            [
+                device.tied(obligation)
+                for obligation in obligations
+                # The others are about numbers, whatever the device, or run the golden model.
+                if isinstance(obligation, Obligation) and not obligation.arithmetic
+            ]
+        )
+        if finding:
+            return finding
+    return ""
 
 
 class _Device:
@@ -275,40 +294,40 @@ class _Device:
     def __init__(self, variant: Variant):
         self._core = core = variant.device(WIDTH)
         self._rtl = Rtl(core)
-        # What ties the values that the face was given to those that it gave.
-        self._clocks: list[list[z3.BoolRef]] = []
-        model = variant.method.golden
+        self._transition = [*self._rtl.transition, self._rtl.rst == 0]
+        self._symbols = _symbols(self._transition)
+        # Of every clock what ties together its values, and the clocks that these are from.
+        self._clocks: list[tuple[list[z3.BoolRef], set[int]]] = []
         face = {"reset": self._reset, "step": self._step, "outputs": self._outputs}
         methods = {name: lambda _, *given, f=f: f(*given) for name, f in face.items()}
         golden = variant.golden(WIDTH)
-        self.golden = type("Device", (model,), methods)(**vars(golden))
+        self.golden = type("Device", (type(golden),), methods)(**vars(golden))
 
     def _reset(self):
         return {name: register.init for name, register in self._core.registers.items()}
 
     def _step(self, state, inputs):
-        return self._clock(state, inputs, self._rtl.registers, "{}'")
+        return self._clock(state | inputs, self._rtl.registers, "{}'")
 
     def _outputs(self, state):
-        return self._clock(state, {}, self._rtl.outputs, "out.{}")
+        return self._clock(state, self._rtl.outputs, "out.{}")
 
-    def _clock(self, state, inputs, wanted, symbol):
-        """Make a clock of its own, and give some values of it."""
-        rtl, given = self._rtl, state | inputs
-        kinds = rtl.registers | rtl.inputs
-        wide = state["running"].size()
+    def _clock(self, given, wanted, symbol):
+        """Make a clock of its own, with given values before it, and give some of its values."""
+        wide = given["running"].size()
         number = len(self._clocks)
         own = {
-            constant.decl().name(): (constant, z3.Const(f"{constant}#{number}", constant.sort()))
-            for constant in _constants(rtl.transition)
+            name: (value, z3.Const(f"{name}#{number}", value.sort()))
+            for name, value in self._symbols.items()
         }
-        clock = [z3.substitute(fact, *own.values()) for fact in [*rtl.transition, rtl.rst == 0]]
-        clock += [
+        kinds = self._rtl.registers | self._rtl.inputs
+        facts = [z3.substitute(fact, *own.values()) for fact in self._transition]
+        facts += [
             extend(own[name][1], signed, wide) == given[name]
             for name, (_, signed) in kinds.items()
             if name in given
         ]
-        self._clocks.append(clock)
+        self._clocks.append((facts, _clocks_of(given.values())))
         return {
             name: extend(own[symbol.format(name)][1], signed, wide)
             for name, (_, signed) in wanted.items()
@@ -318,26 +337,23 @@ class _Device:
         """Assume those clocks of the RTL of which an obligation speaks."""
         claims = obligation.claims
         claims = list(claims.values() if isinstance(claims, dict) else claims)
-        facts = [*obligation.assumptions, *claims]
-        clocks: dict[int, list[z3.BoolRef]] = {}
-        while (
-            new := {
-                int(name.partition("#")[2])
-                for name in (constant.decl().name() for constant in _constants(facts))
-                if "#" in name
-            }
-            - clocks.keys()
-        ):
-            clocks |= {number: self._clocks[number] for number in new}
-            facts = [fact for number in new for fact in self._clocks[number]]
-        assumptions = [fact for clock in clocks.values() for fact in clock]
-        return replace(obligation, assumptions=[*assumptions, *obligation.assumptions])
+        todo, spoken = _clocks_of([*obligation.assumptions, *claims]), set()
+        while todo:
+            spoken |= todo
+            todo = set().union(*(self._clocks[number][1] for number in todo)) - spoken
+        facts = [fact for number in sorted(spoken) for fact in self._clocks[number][0]]
+        return replace(obligation, assumptions=[*facts, *obligation.assumptions])
 
 
-def _constants(facts: list[z3.BoolRef]) -> list[z3.ExprRef]:
-    """Give all symbols of some facts that stand for a value."""
+def _clocks_of(terms: Iterable[Any]) -> set[int]:
+    """Give the numbers of the clocks whose values occur in some terms."""
+    return {int(name.partition("#")[2]) for name in _symbols(terms) if "#" in name}
+
+
+def _symbols(terms: Iterable[Any]) -> dict[str, z3.ExprRef]:
+    """Give all symbols in some terms that stand for a value, by name."""
     found: dict[str, z3.ExprRef] = {}
-    todo, seen = list(facts), set()
+    todo, seen = [term for term in terms if isinstance(term, z3.ExprRef)], set()
     while todo:
         term = todo.pop()
         if term.get_id() in seen:
@@ -346,7 +362,7 @@ def _constants(facts: list[z3.BoolRef]) -> list[z3.ExprRef]:
         todo += term.children()
         if z3.is_const(term) and term.decl().kind() == z3.Z3_OP_UNINTERPRETED:
             found[term.decl().name()] = term
-    return list(found.values())
+    return found
 
 
 def _prove(obligations: list[Obligation]) -> str:
@@ -356,9 +372,10 @@ def _prove(obligations: list[Obligation]) -> str:
         # A solver that gives up has not caught anything.
         assert "gave up" not in verdict.counterexample, verdict
         if not verdict.holds:
+            claim, _, values = verdict.counterexample.rpartition(": ")
             # Not the values within a clock of the RTL.
-            values = [v for v in verdict.counterexample.split(", ") if "#" not in v]
-            return f"{verdict.title}: {', '.join(values)}"
+            values = ", ".join(value for value in values.split(", ") if "#" not in value)
+            return f"{verdict.title}: {claim}: {values}"
     return ""
 
 
@@ -377,9 +394,6 @@ def compiled(variant: Variant) -> str:
         patch.object(engine, "_FLAGS", (*engine._FLAGS, "-O0")),
     ):
         for number, group in enumerate(groups):
-            # Of the arcs that are drawn at random a part will do.
-            fields = ("blocks", "answers", "lengths")
-            group = replace(group, **{name: getattr(group, name)[:256] for name in fields})
             everything = (method, WIDTH, variant.options, number, group, survey.REGISTER_BUDGET)
             for part in survey._parts(*everything):
                 row = survey._survey_part(part)
@@ -407,9 +421,7 @@ def _foreign(variant: Variant, simulator: str) -> str:
     resets = (60, 150, 151)
     golden, top = variant.golden(WIDTH), PlainPorts(variant.device(WIDTH))
     blocks = _BLOCKS[variant.method.curve]
-    _, expected = golden_trace(
-        golden, top.block_fields, blocks, _CLOCK_LIMIT, stalls, resets, until_idle=True
-    )
+    _, expected = _expected(golden, variant.method.curve, stalls, resets)
     names = list(golden.outputs(golden.reset()))
     text = verilog(top, "device")
     try:
@@ -441,8 +453,8 @@ def missing(rung: str) -> str:
     return ""
 
 
-def matrix(caught_by: dict[str, set[str]], left_out: Collection[str] = ()) -> str:
-    """Lay out which rungs catch which design, as a Markdown table."""
+def matrix(method: str, caught_by: dict[str, set[str]], left_out: Collection[str] = ()) -> str:
+    """Lay out which rungs catch which design of a method, as a Markdown table."""
 
     def word(rung: str, rungs: set[str]) -> str:
         return "–" if rung in left_out else "caught" if rung in rungs else "passes"
@@ -451,8 +463,9 @@ def matrix(caught_by: dict[str, set[str]], left_out: Collection[str] = ()) -> st
     table.add_column("design", no_wrap=True)
     for number, rung in zip((1, 2, 3, 4, 5, 6, 6), RUNGS, strict=True):
         table.add_column(f"{number} {rung}", no_wrap=True)
-    for name, rungs in caught_by.items():
-        table.add_row(name, *(word(rung, rungs) for rung in RUNGS))
+    for design in (*SOUND, *VARIANTS):
+        if design.method.name == method:
+            table.add_row(design.name, *(word(rung, caught_by[design.name]) for rung in RUNGS))
     console = Console(width=200)
     with console.capture() as capture:
         console.print(table)
@@ -481,7 +494,9 @@ def main() -> int:
                 caught[name].add(rung)
                 line = textwrap.shorten(finding, 180, placeholder=" …")
                 out.print(f"{name}, {rung}: {line}", markup=False)
-    out.print(matrix(caught, RUNGS.keys() - rungs), markup=False)
+    for method in METHODS:
+        out.print(f"\n{method}:\n", markup=False)
+        out.print(matrix(method, caught, RUNGS.keys() - rungs), markup=False)
     expected = {design.name: design.caught_by & set(rungs) for design in designs}
     return int(caught != expected)
 

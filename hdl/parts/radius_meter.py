@@ -16,9 +16,9 @@ class RadiusMeter(Part):
     S. The end is ``near``, off the circle by at most one step, when \\|√E − √S\\| ≤ 1; for R ≥ 1
     that is (√S − 1)² ≤ E ≤ (√S + 1)², or 1 − ⌊2R⌋ ≤ E − S ≤ 1 + ⌊2R⌋, as E − S is whole.
 
-    Both squares grow from the top bits: the coordinates turn to the left in their registers, ``mask``
-    covers the bits p that have come round, and when the next bit is b the square of 2p + b is 4·p²
-    + b·(4p + 1). The root is drawn from 4·S two bits at a time, as on paper.
+    Both squares grow from the top bits: the coordinates turn to the left in their registers,
+    ``mask`` covers the bits p that have come round, and when the next bit is b the square of 2p + b
+    is 4·p² + b·(4p + 1). The root is drawn from 4·S two bits at a time, as on paper.
 
     Latency: after ``load`` n clocks for the squares, 1 for the difference, n + 2 for the root; in
     the clock after them, 2n + 4 clocks after the load, ``measured`` is 1 and all outputs are valid

@@ -106,9 +106,7 @@ class Circular:
             "position_y": state["yt"],
         }
         for a in "xy":
-            out[f"steps_{a}"] = where(
-                state[f"pulse_{a}"], where(state[f"direction_{a}"], -1, 1), 0
-            )
+            out[f"steps_{a}"] = where(state[f"pulse_{a}"], where(state[f"direction_{a}"], -1, 1), 0)
         return out
 
     def step(self, state: State, inputs: dict[str, Value]) -> State:
@@ -141,9 +139,7 @@ class Circular:
         loaded = self._load(state)
         after = {name: where(load, loaded.get(name, value), value) for name, value in after.items()}
 
-        after["running"] = where(
-            load, negate(state["empty"]), where(finished, 0, state["running"])
-        )
+        after["running"] = where(load, negate(state["empty"]), where(finished, 0, state["running"]))
         after["done"] = (taken & negate(state["running"])) | (load & state["empty"])
         after["error"] = where(start, state["fault"], 0)
 
@@ -370,9 +366,7 @@ class Circular:
             for again in range(2):
                 downwards = state[f"negative_{a}"] ^ again
                 crossed = less(before, turns)
-                beyond = where(
-                    downwards, less(center - limit, -top), less(top - 1, center + limit)
-                )
+                beyond = where(downwards, less(center - limit, -top), less(top - 1, center + limit))
                 out = out | (crossed & beyond)
                 before = before + 2
         return out
