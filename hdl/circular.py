@@ -1,6 +1,6 @@
 """The circular interpolator: two cross-coupled summators in the first quadrant."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from amaranth import Cat, Module, Mux, Signal, Value
 from amaranth.lib import stream
@@ -123,7 +123,7 @@ class Circular(Part):
         A parameter is not one of the above.
     """
 
-    LECTURE: ClassVar[dict[str, object]] = {
+    LECTURE: ClassVar[dict[str, Any]] = {
         "order": "simultaneous",
         "normalize": False,
         "preload": "zero",

@@ -203,7 +203,7 @@ def _lines() -> np.ndarray:
 
 
 #: By the kind of curve: the fields of a block.
-_FIELDS = {"line": ("start_x", "start_y", "end_x", "end_y")}
+_FIELDS: dict[str, tuple[str, ...]] = {"line": ("start_x", "start_y", "end_x", "end_y")}
 _FIELDS["arc"] = (*_FIELDS["line"], "center_x", "center_y", "clockwise", "full_turns")
 
 #: By the kind of curve: what the documents are asked, and how they are read.

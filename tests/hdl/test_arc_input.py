@@ -86,7 +86,7 @@ def run_stage(width, blocks, stalls=NO_STALLS):
 
 
 def assert_prepared(shown, blocks, width):
-    counts = {code.value: 0 for code in ErrorCode}
+    counts = {code.value: 0 for code in ErrorCode.__members__.values()}
     for row, block in zip(shown.tolist(), blocks.tolist(), strict=True):
         wanted = prepared(block, width)
         assert row[: len(wanted)] == wanted, block
@@ -256,7 +256,7 @@ def test_a_start_or_an_end_in_the_centre():
     blocks = [(*start, *center, *center, way, 0) for start in far for way in (0, 1)]
     blocks += [(*center, *end, *center, way, 0) for end in far for way in (0, 1)]
     _, _, shown = run_stage(8, np.array(blocks))
-    wanted = [0 if x * x + y * y == 1 else OFF_CURVE for x, y in points for way in (0, 1)]
+    wanted = [0 if x * x + y * y == 1 else OFF_CURVE for x, y in points for _ in (0, 1)]
     assert shown[:, 0].tolist() == wanted + [OFF_CURVE] * len(wanted)
     assert not shown[:, 1].any()
 

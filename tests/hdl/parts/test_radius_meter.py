@@ -134,7 +134,8 @@ def test_points_at_the_bound_and_at_random(width):
     pairs = list(barely(width))
     assert {expected(*pair)[2] for pair in pairs} == {True, False}
     for size in rng.integers(1, width + 1, 20):
-        pairs.append(tuple(map(tuple, rng.integers(2 ** int(size), size=(2, 2)).tolist())))
+        x, y, u, v = rng.integers(2 ** int(size), size=4).tolist()
+        pairs.append(((x, y), (u, v)))
 
     async def bench(ctx):
         for start, end in pairs:

@@ -42,7 +42,7 @@ def run(golden, blocks, limit=20_000):
     """
     blocks = np.array(blocks, dtype=np.int64)
     steps = [[] for _ in blocks]
-    answers = [None for _ in blocks]
+    answers: list[tuple[int, int, int] | None] = [None for _ in blocks]
     points = blocks[:, :2].copy()
     state = {name: np.full(len(blocks), value) for name, value in golden.reset().items()}
     for clock in range(limit):
@@ -161,6 +161,7 @@ def test_every_step_at_32_bits(variant):
     for block in draw_arcs(32, 16, seed=3, radius=9).tolist():
         state, steps, point = golden.reset(), [], list(block[:2])
         inputs = dict(zip((f"blocks_{name}" for name in FIELDS), block, strict=True))
+        clock, out = 0, golden.outputs(state)
         for clock in range(2000):
             out = golden.outputs(state)
             if out["steps_valid"]:
