@@ -6,7 +6,6 @@
 #include <cxxrtl/capi/cxxrtl_capi.h>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <vector>
 
 extern "C" cxxrtl_toplevel cxxrtl_design_create();
@@ -191,27 +190,6 @@ void bench_run(void *handle, Request *request) {
 		bench.edge();
 		bench.clock++;
 		r.ran++;
-	}
-}
-
-// Many copies of the design, side by side, each with one block of its own: for exhaustive checks.
-// blocks: [lanes][block fields], fed from reset, or nullptr to go on; watch: [lanes][clocks][watched].
-void bench_lanes(void **handles, uint64_t lanes, uint64_t clocks, const int64_t *blocks, uint64_t seed,
-		uint64_t stall_below, int64_t *watch) {
-	Request r;
-	memset(&r, 0, sizeof r);
-	r.clocks = clocks;
-	r.block_count = blocks != nullptr;
-	r.stall_below = stall_below;
-	for (uint64_t lane = 0; lane < lanes; lane++) {
-		Bench *bench = static_cast<Bench *>(handles[lane]);
-		if (blocks != nullptr) {
-			bench->reset();
-			r.blocks = blocks + lane * bench->block_fields.size();
-		}
-		r.seed = seed + lane;
-		r.watch = watch + lane * clocks * bench->watched.size();
-		bench_run(bench, &r);
 	}
 }
 

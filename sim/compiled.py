@@ -11,7 +11,6 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
@@ -122,7 +121,6 @@ class CompiledModel:
             for kind, names in enumerate((self.block_fields, self.step_fields, watch))
             for name in names
         ]
-        self._lanes: list[int] = []
         self._bench = self._create()
         self.reset()
 
@@ -135,9 +133,8 @@ class CompiledModel:
 
     def close(self) -> None:
         """Give the model's memory back."""
-        for bench in [self._bench, *self._lanes]:
-            self._call.bench_destroy(ctypes.c_void_p(bench))
-        self._bench, self._lanes = 0, []
+        self._call.bench_destroy(ctypes.c_void_p(self._bench))
+        self._bench = 0
 
     def __del__(self):
         if getattr(self, "_bench", 0):
@@ -195,36 +192,3 @@ class CompiledModel:
             events=events[: request.event_count],
             watch=watch[: request.ran],
         )
-
-    def lanes(
-        self, blocks: np.ndarray, clocks: int, *, window: int = 0, stalls: Stalls = NO_STALLS
-    ) -> Iterator[np.ndarray]:
-        """Run every block on a copy of its own, each from reset, for the same number of clocks.
-
-        Lane i stalls with the pattern of seed ``stalls.seed`` + i.
-
-        Yields
-        ------
-        array of int64, shape (blocks, up to ``window`` clocks, watched signals)
-            One window of clocks after the other; all of them in one with ``window`` 0.
-        """
-        blocks = np.ascontiguousarray(blocks, dtype=np.int64)
-        assert blocks.shape[1:] == (len(self.block_fields),)
-        while len(self._lanes) < len(blocks):
-            self._lanes.append(self._create())
-        handles = (ctypes.c_void_p * len(blocks))(*self._lanes[: len(blocks)])
-        number = ctypes.c_uint64
-        window = window or clocks
-        for begin in range(0, clocks, window):
-            count = min(window, clocks - begin)
-            watch = np.empty((len(blocks), count, len(self.watch)), dtype=np.int64)
-            self._call.bench_lanes(
-                handles,
-                number(len(blocks)),
-                number(count),
-                ctypes.c_void_p(None if begin else blocks.ctypes.data),
-                number(stalls.seed),
-                number(stalls.stall_below),
-                ctypes.c_void_p(watch.ctypes.data),
-            )
-            yield watch
