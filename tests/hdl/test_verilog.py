@@ -65,7 +65,7 @@ def test_same_bytes_in_every_folder_and_for_every_hash_seed(tmp_path):
 @pytest.mark.parametrize("method", METHODS)
 def test_twice_from_one_core(method):
     top = PlainPorts(make(method))
-    assert [verilog(top, f"discreta_{method}") for _ in range(2)] == [emit(method)] * 2
+    assert verilog(top, f"discreta_{method}") == emit(method)
     assert verilog(top.core, f"discreta_{method}") == emit(method)
 
 

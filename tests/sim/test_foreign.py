@@ -111,7 +111,6 @@ def test_lines_in_icarus_equal_golden(configuration, clocks, longest, stalls):
     ("configuration", "clocks", "radius", "stalls"),
     [
         (ARC, 2500, 10, NO_STALLS),
-        (ARC, 2900, 10, Stalls(seed=3, stall=0.4, gap=0.6)),
         ((5, *LECTURE), 2300, 10, Stalls(seed=3, stall=0.4, gap=0.6)),
         ((4, "alternated", False, "zero", 1), 2300, 3, NO_STALLS),
         ((32, "simultaneous", True, "half", 1), 1300, 3, Stalls(seed=3, stall=0.4, gap=0.6)),
