@@ -51,6 +51,8 @@ class ErrorCode(enum.Enum, shape=2):  # pyright: ignore[reportGeneralTypeIssues,
     #: The end is more than one step off the circle around the centre on which the start lies, or
     #: the start is the centre.
     OFF_CURVE = 2
+    #: The curve has no direction at the start, or is too sharp for the grid there.
+    SHARP = 3
 
 
 class Part(wiring.Component):

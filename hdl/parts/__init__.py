@@ -6,6 +6,7 @@ from discreta.hdl.parts.normalizer import Normalizer
 from discreta.hdl.parts.position_register import PositionRegister
 from discreta.hdl.parts.radius_meter import RadiusMeter
 from discreta.hdl.parts.remaining_counter import RemainingCounter
+from discreta.hdl.parts.scale_converter import ScaleConverter
 from discreta.hdl.parts.summator import PRELOADS, Summator
 
 __all__ = [
@@ -16,5 +17,6 @@ __all__ = [
     "PositionRegister",
     "RadiusMeter",
     "RemainingCounter",
+    "ScaleConverter",
     "Summator",
 ]

@@ -3,7 +3,7 @@
 from functools import reduce
 from operator import or_
 
-from amaranth import Module, Signal
+from amaranth import Module, Shape, Signal
 from amaranth.lib.wiring import In, Out
 
 from discreta.hdl.contract import Part, check_axes, check_width, per_axis
@@ -21,6 +21,9 @@ class Normalizer(Part):
     Built of ⌈log2 n⌉ stages; the stage of 2^k shifts by 2^k places when the top 2^k bits of every
     axis are zero.
 
+    With ``signed`` the increments are numbers with a sign, the stages look at the bits that repeat
+    the sign, and the top bit in question is the one below it.
+
     Latency: none, it is combinational. Throughput: a set of increments a clock. No registers, so no
     reset. Overflow: none. Error: none, no bit is lost.
     Source: lecture, the constant k ("ΔX and ΔY are multiplied by 2 at the same time until …").
@@ -31,6 +34,8 @@ class Normalizer(Part):
         n, 4 to 32 bits.
     axes : int
         2 to 6.
+    signed : bool
+        The increments have a sign; then ``width`` may be up to 72.
 
     Raises
     ------
@@ -38,13 +43,15 @@ class Normalizer(Part):
         A parameter is out of range.
     """
 
-    def __init__(self, width: int, axes: int):
-        check_width(width)
+    def __init__(self, width: int, axes: int, *, signed: bool = False):
+        if not signed:
+            check_width(width)
         check_axes(axes)
-        layout = per_axis(axes, width)
+        layout = per_axis(axes, Shape(width, signed))
         super().__init__({"increments": In(layout), "normalized": Out(layout)})
         self.width = width
         self.axes = axes
+        self.signed = signed
 
     def elaborate(self, platform):
         """Describe the hardware."""
@@ -53,9 +60,16 @@ class Normalizer(Part):
         values = {letter: self.increments[letter] for letter in letters}
         for k in reversed(range((self.width - 1).bit_length())):
             places = 1 << k
-            stage = {letter: Signal(self.width, name=f"{letter}_{places}") for letter in letters}
+            shape = Shape(self.width, self.signed)
+            stage = {letter: Signal(shape, name=f"{letter}_{places}") for letter in letters}
             free = Signal(name=f"free_{places}")
-            tops = (values[letter][self.width - places :] for letter in letters)
+            if self.signed:
+                # A bit that differs from the next lower one among those that would go, and the new sign.
+                tops = (
+                    (values[a] ^ (values[a] << 1))[self.width - places : self.width] for a in letters
+                )
+            else:
+                tops = (values[letter][self.width - places :] for letter in letters)
             m.d.comb += free.eq(reduce(or_, tops) == 0)
             for letter in letters:
                 with m.If(free):
