@@ -297,7 +297,6 @@ class Conic(Part):
         for k in "xy":
             delta[k] = Signal(signed(2), name=f"delta_{k}")
             m.d.comb += delta[k].eq(Cat(step[k], step[k] & direction[k]))
-        self._prepare(m, accept, empty, add, delta)
         with m.If(add):
             m.d.sync += [
                 p1.eq(p1 + delta["x"]),
@@ -307,6 +306,7 @@ class Conic(Part):
             ]
         with m.If(turn):
             m.d.sync += self.turns.eq(self.turns - 1)
+        self._prepare(m, accept, empty, add, delta)
 
         # What a block and a change of direction load: the way to go, and how far.
         first = {
@@ -392,14 +392,10 @@ class Conic(Part):
             ]
             with m.If(~empty & ((size < 2 * bend) | (size == 0))):
                 m.d.sync += self.fault.eq(ErrorCode.SHARP)
-        with m.Elif(tick == n + 2):
-            m.d.sync += tick.eq(tick + 1)
         with m.Elif(tick != 0):
-            m.d.sync += [
-                tick.eq(tick + 1),
-                p1.eq(p1.rotate_left(1)),
-                p2.eq(p2.rotate_left(1)),
-            ]
+            m.d.sync += tick.eq(tick + 1)
+            with m.If(tick < n + 2):
+                m.d.sync += [p1.eq(p1.rotate_left(1)), p2.eq(p2.rotate_left(1))]
         scales = {"x": (a << 1, b, d), "y": (b, c << 1, e)}
         for k, converter in self.converter.items():
             m.submodules[f"g{k}_converter"] = converter

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from discreta.hdl.circular import Circular
+from discreta.hdl.conic import Conic
 from discreta.hdl.contract import Part
 from discreta.hdl.linear import Linear
 from discreta.sim.golden.circular import Circular as GoldenCircular
+from discreta.sim.golden.conic import Conic as GoldenConic
 from discreta.sim.golden.linear import Linear as GoldenLinear
 
 __all__ = ["METHODS", "Method"]
@@ -158,6 +160,27 @@ METHODS = {
                 "lecture": Circular.LECTURE,
             },
             clocks=_circular_clocks,
+            bound=lambda _: None,
+        ),
+        Method(
+            name="conic",
+            curve="conic",
+            summary="any curve of the second order by summation of its two derivatives (DDA)",
+            error_bound="surveyed",
+            clocks_per_step="surveyed",
+            device=Conic,
+            golden=GoldenConic,
+            axes=(2,),
+            choices={
+                "order": ("implicit", "alternated", "simultaneous"),
+                "preload": ("half", "zero"),
+                "guard": (2, 0),
+            },
+            settings={
+                "default": {"order": "implicit", "preload": "half", "guard": 2},
+                "lecture": {"order": "simultaneous", "preload": "zero", "guard": 0},
+            },
+            clocks=lambda golden, blocks: np.full(len(blocks), 1 << 24),
             bound=lambda _: None,
         ),
     )
