@@ -1,8 +1,8 @@
 """The interpolator of curves of the second order: two derivatives, summed with carry and borrow."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from amaranth import Cat, Const, Module, Mux, Signal, Value
+from amaranth import Cat, Module, Mux, Signal, Value
 from amaranth.hdl import signed
 from amaranth.lib import data, stream
 from amaranth.lib.wiring import In, Out
@@ -16,17 +16,22 @@ from discreta.hdl.contract import (
     point_layout,
     step_layout,
 )
-from discreta.hdl.parts import PRELOADS, ControlUnit, Normalizer, ScaleConverter
-from discreta.hdl.parts.scale_converter import (
-    coefficient_bits,
-    derivative_bits,
-    linear_bits,
-    times,
+from discreta.hdl.parts import (
+    PRELOADS,
+    ControlUnit,
+    Normalizer,
+    PositionRegister,
+    RemainingCounter,
+    ScaleConverter,
+    StepAdder,
 )
+from discreta.hdl.parts.scale_converter import coefficient_bits, derivative_bits, linear_bits
+from discreta.hdl.parts.step_adder import times
 from discreta.hdl.quadrant import QuadrantOutput
 
-__all__ = ["ORDERS", "TURNS_BITS", "Conic", "conic_block_layout"]
+__all__ = ["MAX_WIDTH", "ORDERS", "TURNS_BITS", "Conic", "conic_block_layout"]
 
+MAX_WIDTH = 24
 ORDERS = ("implicit", "alternated", "simultaneous")
 TURNS_BITS = 11
 
@@ -117,7 +122,8 @@ class Conic(Part):
     Parameters
     ----------
     width : int
-        n, 4 to 32. Coordinates are signed, n + 1 bits; steps are 1 long.
+        n, 4 to 24: no register of a wider one would fit 64 bits. Coordinates are signed, n + 1
+        bits; steps are 1 long.
     order : str
         ``"implicit"``, ``"alternated"`` or ``"simultaneous"``.
     preload : str
@@ -147,7 +153,7 @@ class Conic(Part):
     def __init__(
         self, width: int = 16, *, order: str = "implicit", preload: str = "half", guard: int = 2
     ):
-        check_width(width)
+        check_width(width, MAX_WIDTH)
         check_choice("order", order, ORDERS)
         check_choice("preload", preload, PRELOADS)
         check_guard(guard)
@@ -180,12 +186,13 @@ class Conic(Part):
         self.uu = ControlUnit()
         self.output = QuadrantOutput(2)
         self.p1, self.p2 = Signal(coordinate, name="p1"), Signal(coordinate, name="p2")
-        self.p3, self.p4 = Signal(n + 1, name="p3"), Signal(n + 1, name="p4")
+        self.p3 = RemainingCounter(n + 1, name="p3")
+        self.p4 = RemainingCounter(n + 1, name="p4")
         self.sx = Signal(sum_shape, name="sx", init=self.initial_sum)
         self.sy = Signal(sum_shape, name="sy", init=self.initial_sum)
         self.converter = {a: ScaleConverter(width, name=f"g{a}") for a in "xy"}
         self.gx, self.gy = (converter.register for converter in self.converter.values())
-        self.xt, self.yt = Signal(coordinate, name="xt"), Signal(coordinate, name="yt")
+        self.xt, self.yt = PositionRegister(n, name="xt"), PositionRegister(n, name="yt")
         square, linear = signed(coefficient_bits(n)), signed(linear_bits(n))
         self.coefficients = {
             **{k: Signal(square, name=k) for k in "abc"},
@@ -200,13 +207,35 @@ class Conic(Part):
         self.fault = Signal(ErrorCode)
         self.tick = Signal(range(n + 4), name="tick")
 
+        bits = derivative_bits(width)
+        self.normalizer = Normalizer(bits, 5, signed=True)
+        #: Of the axis that is added to first, and of the other one.
+        self.adders = tuple(StepAdder(bits + 1, bits - 1 + guard) for _ in range(2))
+        lanes = zip(("gx", "gy", "2a", "b", "2c"), "xyzab", strict=True)
+        self.intermediates = {
+            **{f"scaled_{name}": self.normalizer.normalized[lane] for name, lane in lanes},
+            **{
+                f"{which}_{name}": signal
+                for which, adder in zip(("first", "second"), self.adders, strict=True)
+                for name, signal in (
+                    ("velocity", adder.velocity),
+                    ("total", adder.total),
+                    ("step", adder.step),
+                    ("own", adder.own),
+                    ("carried", adder.carried),
+                    ("unlimited", adder.unlimited),
+                    ("rest", adder.rest),
+                )
+            },
+        }
+
         out, uu = self.output, self.uu
         groups = {
             "P1, P2 coordinates": [self.p1, self.p2],
             "GX, GY derivatives": [self.gx, self.gy],
             "SX, SY summators": [self.sx, self.sy],
-            "P3, P4 steps left": [self.p3, self.p4],
-            "XT, YT position": [self.xt, self.yt],
+            "P3, P4 steps left": [self.p3.register, self.p4.register],
+            "XT, YT position": [self.xt.register, self.yt.register],
             "scale converters": [*self.coefficients.values()],
             "pieces": [
                 self.turns,
@@ -230,23 +259,20 @@ class Conic(Part):
     def elaborate(self, platform):
         """Describe the hardware."""
         m = Module()
-        n = self.width
         out, uu = self.output, self.uu
+        p1, p2, p3, p4 = self.p1, self.p2, self.p3, self.p4
         m.submodules.uu = uu
         m.submodules.output = out
-        p1, p2, p3, p4, sx, sy, gx, gy = (
-            *(self.p1, self.p2, self.p3, self.p4),
-            *(self.sx, self.sy, self.gx, self.gy),
-        )
-        cw = self.clockwise
-        accept, empty, pending = Signal(), Signal(), Signal()
+        m.submodules.p3_counter = p3
+        m.submodules.p4_counter = p4
+        m.submodules.xt_register = self.xt
+        m.submodules.yt_register = self.yt
+        accept, empty = Signal(), Signal()
         m.d.comb += [
             # A block is prepared in the registers it runs in: when they are free.
             self.blocks.ready.eq(~self.held & uu.idle),
             accept.eq(self.blocks.valid & self.blocks.ready),
-            empty.eq((self.turns == 0) & (p1 == self.xk) & (p2 == self.yk)),
-            pending.eq(self.held & (self.tick == 0)),
-            uu.pending.eq(pending),
+            uu.pending.eq(self.held & (self.tick == 0)),
             uu.fault.eq(self.fault),
             uu.empty.eq(empty),
             uu.waiting.eq(out.waiting),
@@ -257,28 +283,39 @@ class Conic(Part):
             self.done.eq(uu.done),
             self.error.eq(uu.error),
         ]
-        # The velocities' signs, and the axis that is summed first: the other one slows down.
+        with m.If(accept):
+            m.d.sync += self.held.eq(1)
+        with m.Elif(uu.start):
+            m.d.sync += self.held.eq(0)
+
+        # Which way each axis would go now, and whether that is the way of the piece.
+        cw = self.clockwise
         direction = out.direction_registers
         piece = {k: direction[k] ^ self.backward[k] for k in "xy"}
-        below = {"x": Mux(cw, gy < 0, gy > 0), "y": Mux(cw, gx > 0, gx < 0)}
-        moves = {
-            "x": (gy != 0) & (below["x"] == piece["x"]),
-            "y": (gx != 0) & (below["y"] == piece["y"]),
+        below = {
+            "x": Mux(cw, self.gy < 0, self.gy > 0),
+            "y": Mux(cw, self.gx > 0, self.gx < 0),
         }
+        still = {"x": self.gy == 0, "y": self.gx == 0}
+        goes = {k: ~still[k] & (below[k] == piece[k]) for k in "xy"}
+        left = {"x": ~p3.zero, "y": ~p4.zero}
+        able = {k: left[k] & ~self.backward[k] & goes[k] for k in "xy"}
+        # The axis that speeds up; the other one slows down, stops, and goes back.
         x_first = Signal()
         m.d.comb += x_first.eq(piece["x"] ^ piece["y"] ^ cw)
-        last, whole, halve, turn, add, dead, complete = (
-            Signal(name=name)
-            for name in ("last_piece", "whole", "halve", "turn", "add", "dead", "complete")
+
+        # A clock pulse of УУ takes off the half increment, turns an axis round, or sums.
+        halve, whole, turn, add, dead, complete = (
+            Signal(name=name) for name in ("halve", "whole", "turn", "add", "dead", "complete")
         )
-        left = {"x": p3 != 0, "y": p4 != 0}
-        able = {k: left[k] & ~self.backward[k] & moves[k] for k in "xy"}
+        last, entering = Signal(name="last_piece"), Signal()
         m.d.comb += [
             last.eq(self.turns == 0),
+            entering.eq(self.turns == 1),
             halve.eq(uu.clock & self.fresh),
             whole.eq(uu.clock & ~self.fresh),
             dead.eq(~able["x"] & ~able["y"]),
-            turn.eq(whole & ~last & (dead | ~Mux(x_first, moves["y"], moves["x"]))),
+            turn.eq(whole & ~last & (dead | ~Mux(x_first, goes["y"], goes["x"]))),
             add.eq(whole & ~turn),
             complete.eq(add & last & dead),
         ]
@@ -287,89 +324,91 @@ class Conic(Part):
                 m.d.sync += self.fresh.eq(1)
             with m.Elif(uu.clock):
                 m.d.sync += self.fresh.eq(0)
-
-        step = self._sum(m, x_first, piece, able, add, halve)
-        step = {
-            "x": step["x"] | (complete & left["x"]),
-            "y": step["y"] | (complete & left["y"]),
-        }
-        delta = {}
-        for k in "xy":
-            delta[k] = Signal(signed(2), name=f"delta_{k}")
-            m.d.comb += delta[k].eq(Cat(step[k], step[k] & direction[k]))
-        with m.If(add):
-            m.d.sync += [
-                p1.eq(p1 + delta["x"]),
-                p2.eq(p2 + delta["y"]),
-                p3.eq(p3 - step["x"]),
-                p4.eq(p4 - step["y"]),
-            ]
         with m.If(turn):
             m.d.sync += self.turns.eq(self.turns - 1)
-        self._prepare(m, accept, empty, add, delta)
 
-        # What a block and a change of direction load: the way to go, and how far.
-        first = {
-            "x": Mux(gy == 0, ~below["y"] ^ cw, below["x"]),
-            "y": Mux(gx == 0, below["x"] ^ cw, below["y"]),
-        }
-        slows = {"x": ~x_first, "y": x_first}
-        ahead = {}
+        # Steps: carries and borrows, or what is left when there can be no more of them.
+        hit = self._sum(m, x_first, piece, able, add, halve)
+        step = {k: hit[k] | (complete & left[k]) for k in "xy"}
+        moves = {}
         for k in "xy":
-            ahead[k] = Signal(name=f"ahead_{k}")
-            m.d.comb += ahead[k].eq(Mux(uu.load, first[k], piece[k] ^ slows[k]))
-        final = Signal()
-        m.d.comb += [
-            final.eq(Mux(uu.load, last, self.turns == 1)),
-            out.load.eq(uu.load | turn),
-        ]
-        for k, p, end, count in (("x", p1, self.xk, p3), ("y", p2, self.yk, p4)):
-            way = Signal(signed(n + 2), name=f"way_{k}")
-            back = Signal(name=f"back_{k}")
-            room = Cat(p[:n], ~p[n])
+            moves[k] = Signal(signed(2), name=f"move_{k}")
             m.d.comb += [
-                way.eq(end - p),
-                back.eq(final & (way != 0) & ((way < 0) != ahead[k])),
-                out.negative[k].eq(ahead[k] ^ back),
-            ]
-            with m.If(out.load):
-                m.d.sync += [
-                    self.backward[k].eq(back),
-                    count.eq(Mux(final, Mux(way < 0, -way, way), Mux(ahead[k], room, ~room))),
-                ]
-        for k, s in (("x", sx), ("y", sy)):
-            with m.If(uu.load):
-                falling = self.modulus - 1 - self.initial_sum
-                m.d.sync += s.eq(Mux(ahead[k], falling, self.initial_sum))
-        for k, t, p in (("x", self.xt, p1), ("y", self.yt, p2)):
-            with m.If(uu.load):
-                m.d.sync += t.eq(p)
-            with m.Elif(out.up[k]):
-                m.d.sync += t.eq(t + 1)
-            with m.Elif(out.down[k]):
-                m.d.sync += t.eq(t - 1)
-            m.d.comb += [
-                self.position[k].eq(t),
+                moves[k].eq(Cat(step[k], step[k] & direction[k])),
                 out.carry[k].eq(step[k]),
                 self.steps.payload[k].eq(out.step[k]),
             ]
+        with m.If(add):
+            m.d.sync += [p1.eq(p1 + moves["x"]), p2.eq(p2 + moves["y"])]
         m.d.comb += [
-            uu.ending.eq(last & (p3 == step["x"]) & (p4 == step["y"])),
             out.clock.eq(uu.clock),
             out.taken.eq(uu.taken),
+            out.load.eq(uu.load | turn),
         ]
-        with m.If(uu.start):
-            m.d.sync += self.held.eq(0)
-        with m.If(accept):
-            m.d.sync += self.held.eq(1)
+        self._prepare(m, accept, empty, moves)
+
+        # What a block and a change of direction load: the way to go, and how far.
+        first = {
+            "x": Mux(still["x"], ~below["y"] ^ cw, below["x"]),
+            "y": Mux(still["y"], below["x"] ^ cw, below["y"]),
+        }
+        slows = {"x": ~x_first, "y": x_first}
+        final = Mux(uu.load, last, entering)
+        falling = self.modulus - 1 - self.initial_sum
+        here, lands = {}, {}
+        for k, p, end, count, s, t in (
+            ("x", p1, self.xk, p3, self.sx, self.xt),
+            ("y", p2, self.yk, p4, self.sy, self.yt),
+        ):
+            way = Signal(signed(self.width + 2), name=f"way_{k}")
+            ahead, back = Signal(name=f"ahead_{k}"), Signal(name=f"back_{k}")
+            # As far as the coordinates go, upwards or downwards.
+            room = Mux(ahead, Cat(p[:-1], ~p[-1]), Cat(~p[:-1], p[-1]))
+            m.d.comb += [
+                way.eq(end - p),
+                ahead.eq(Mux(uu.load, first[k], piece[k] ^ slows[k])),
+                back.eq(final & (way != 0) & ((way < 0) != ahead)),
+                out.negative[k].eq(ahead ^ back),
+                count.load.eq(out.load),
+                count.initial.eq(Mux(final, Mux(way < 0, -way, way), room)),
+                count.count.eq(step[k]),
+                t.load.eq(uu.load),
+                t.initial.eq(p),
+                t.up.eq(out.up[k]),
+                t.down.eq(out.down[k]),
+                self.position[k].eq(t.register),
+            ]
+            with m.If(out.load):
+                m.d.sync += self.backward[k].eq(back)
+            here[k] = way == 0
+            lands[k] = Mux(step[k], way == Mux(direction[k], -1, 1), here[k])
+            with m.If(uu.load):
+                m.d.sync += s.eq(Mux(ahead, falling, self.initial_sum))
+
+        # A step that lands on the end with one change of direction to come is the last one too:
+        # after the change there would be no step left to be the last.
+        arrived = Signal()
+        m.d.comb += [
+            empty.eq(last & here["x"] & here["y"]),
+            arrived.eq(add & (last | entering) & lands["x"] & lands["y"]),
+            uu.stepless.eq(turn & entering & here["x"] & here["y"]),
+            uu.ending.eq(arrived | uu.stepless),
+        ]
         return m
 
-    def _prepare(self, m: Module, accept, empty, move, delta) -> None:
+    def _prepare(self, m: Module, accept, empty, moves) -> None:
         """Multiply the start by the coefficients, bit by bit, while its coordinates turn round."""
         n = self.width
         block = self.blocks.payload
         a, b, c, d, e = self.coefficients.values()
         p1, p2, gx, gy, tick = self.p1, self.p2, self.gx, self.gy, self.tick
+        multiply = Signal()
+        m.d.comb += multiply.eq((tick != 0) & (tick < n + 2))
+        size, bend = Signal(2 * n + 8), Signal(n + 6)
+        m.d.comb += [
+            size.eq(abs(gx) + abs(gy)),
+            bend.eq(abs(a) + abs(b) + abs(c)),
+        ]
         with m.If(accept):
             m.d.sync += [
                 *[self.coefficients[k].eq(block[k]) for k in "abcde"],
@@ -384,17 +423,11 @@ class Conic(Part):
             ]
         with m.Elif(tick == n + 3):
             m.d.sync += tick.eq(0)
-            size = Signal(2 * n + 9)
-            bend = Signal(n + 7)
-            m.d.comb += [
-                size.eq(abs(gx) + abs(gy)),
-                bend.eq(2 * (abs(a) + abs(b) + abs(c))),
-            ]
-            with m.If(~empty & ((size < 2 * bend) | (size == 0))):
+            with m.If(~empty & ((size < 4 * bend) | (size == 0))):
                 m.d.sync += self.fault.eq(ErrorCode.SHARP)
         with m.Elif(tick != 0):
             m.d.sync += tick.eq(tick + 1)
-            with m.If(tick < n + 2):
+            with m.If(multiply):
                 m.d.sync += [p1.eq(p1.rotate_left(1)), p2.eq(p2.rotate_left(1))]
         scales = {"x": (a << 1, b, d), "y": (b, c << 1, e)}
         for k, converter in self.converter.items():
@@ -405,66 +438,67 @@ class Conic(Part):
                 converter.y_scale.eq(y_scale),
                 converter.rest.eq(rest),
                 converter.clear.eq(accept),
-                converter.multiply.eq((tick != 0) & (tick < n + 2)),
+                converter.multiply.eq(multiply),
                 converter.sign.eq(tick == 1),
                 converter.x_bit.eq(p1[n]),
                 converter.y_bit.eq(p2[n]),
                 converter.add.eq(tick == n + 2),
-                converter.move.eq(move),
-                converter.x_step.eq(delta["x"]),
-                converter.y_step.eq(delta["y"]),
+                converter.move.eq(moves["x"].any() | moves["y"].any()),
+                converter.x_step.eq(moves["x"]),
+                converter.y_step.eq(moves["y"]),
             ]
 
-    def _sum(self, m: Module, x_first, piece, able, add, halve) -> dict[str, Signal]:
+    def _sum(self, m: Module, x_first, piece, able, add, halve) -> dict[str, Value]:
         """Sum the velocities of both axes, in their order; give which axes step."""
         a, b, c = (self.coefficients[k] for k in "abc")
-        cw, sx, sy = self.clockwise, self.sx, self.sy
-        w = derivative_bits(self.width)
-        m.submodules.normalizer = normalizer = Normalizer(w, 5, signed=True)
+        cw, bits = self.clockwise, derivative_bits(self.width)
+        m.submodules.normalizer = normalizer = self.normalizer
         # An axis that does not go must not hold the other one up.
-        gx, gy = Mux(able["y"], self.gx, 0), Mux(able["x"], self.gy, 0)
-        for lane, value in zip("xyzab", (gx, gy, a << 1, b, c << 1), strict=True):
+        lanes = (Mux(able["y"], self.gx, 0), Mux(able["x"], self.gy, 0), a << 1, b, c << 1)
+        for lane, value in zip("xyzab", lanes, strict=True):
             m.d.comb += normalizer.increments[lane].eq(value)
         big_gx, big_gy, big_a, big_b, big_c = (normalizer.normalized[k] for k in "xyzab")
-        vx, vy = Signal(signed(w + 1)), Signal(signed(w + 1))
-        m.d.comb += [vx.eq(Mux(cw, big_gy, -big_gy)), vy.eq(Mux(cw, -big_gx, big_gx))]
+        velocity = {k: Signal(signed(bits + 1), name=f"velocity_{k}") for k in "xy"}
+        m.d.comb += [
+            velocity["x"].eq(Mux(cw, big_gy, -big_gy)),
+            velocity["y"].eq(Mux(cw, -big_gx, big_gx)),
+        ]
 
-        # The first axis summed and the second: x and y, or with ``swap`` the other way round.
-        ordered = self.order != "simultaneous"
-        swap = ~x_first if ordered else Const(0, 1)
-        change: Value = Const(0, 1)
-        after, steps = [], []
-        for number, is_y in enumerate((swap, ~swap)):
-            down = Mux(is_y, piece["y"], piece["x"])
-            can = add & Mux(is_y, able["y"], able["x"])
-            total = Signal(signed(w + self.guard + 3), name=f"total_{number}")
-            hit, step = Signal(name=f"hit_{number}"), Signal(signed(2), name=f"step_{number}")
+        # The axis that is added to first, and the other one: x and y, or with ``swap`` y and x.
+        swap = Signal()
+        sums = {"x": self.sx, "y": self.sy}
+        m.submodules.first_adder, m.submodules.second_adder = earlier, later = self.adders
+        for adder, is_y in ((earlier, swap), (later, ~swap)):
+            mine = Signal(name="mine")
             m.d.comb += [
-                total.eq(Mux(is_y, sy, sx) + Mux(is_y, vy, vx) + change),
-                hit.eq(can & Mux(down, total < 0, total >= self.modulus)),
-                step.eq(Cat(hit, hit & down)),
+                adder.sum.eq(Mux(is_y, sums["y"], sums["x"])),
+                adder.velocity.eq(Mux(is_y, velocity["y"], velocity["x"])),
+                adder.down.eq(Mux(is_y, piece["y"], piece["x"])),
+                mine.eq(Mux(is_y, able["y"], able["x"])),
+                adder.enable.eq(add & mine),
             ]
-            rest = total - times(step, Const(self.modulus))
-            # What a step changes in the velocity of the second axis: that is y' = Gx, or x' = −Gy.
-            other_way = swap ^ cw
-            if number == 1 and self.order == "implicit":
-                own = times(step, big_b)
-                rest = rest + Mux(other_way, -own, own)
-            after.append((can, rest))
-            steps.append(hit)
-            if ordered and number == 0:
-                cross = times(step, Mux(swap, big_c, big_a))
-                change = Mux(other_way, -cross, cross)
-        for s, mine in ((sx, swap), (sy, ~swap)):
-            (can_0, after_0), (can_1, after_1) = after
-            with m.If(Mux(mine, can_1, can_0)):
-                m.d.sync += s.eq(Mux(mine, after_1, after_0))
-        step = {"x": Mux(swap, steps[1], steps[0]), "y": Mux(swap, steps[0], steps[1])}
+            with m.If(adder.enable & ~is_y):
+                m.d.sync += sums["x"].eq(adder.rest)
+            with m.If(adder.enable & is_y):
+                m.d.sync += sums["y"].eq(adder.rest)
+        if self.order != "simultaneous":
+            # What steps change in the velocity of the second axis: that is y' = Gx, or x' = −Gy.
+            opposite = swap ^ cw
+            cross = times(earlier.step, Mux(swap, big_c, big_a))
+            m.d.comb += [swap.eq(~x_first), later.change.eq(Mux(opposite, -cross, cross))]
+            if self.order == "implicit":
+                m.d.comb += later.own.eq(Mux(opposite, -big_b, big_b))
         if self.halves:
             # On a straight line neither axis waits for the other.
             bent = (a != 0) | (b != 0) | (c != 0)
-            with m.If(halve & bent & x_first):
-                m.d.sync += sx.eq(sx - (vx >> 1))
-            with m.If(halve & bent & ~x_first):
-                m.d.sync += sy.eq(sy - (vy >> 1))
-        return step
+            halved = Signal.like(self.sx, name="halved")
+            m.d.comb += halved.eq(earlier.sum - (earlier.velocity >> 1))
+            with m.If(halve & bent):
+                with m.If(swap):
+                    m.d.sync += sums["y"].eq(halved)
+                with m.Else():
+                    m.d.sync += sums["x"].eq(halved)
+        return {
+            "x": Mux(swap, later.step[0], earlier.step[0]),
+            "y": Mux(swap, earlier.step[0], later.step[0]),
+        }

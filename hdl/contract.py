@@ -10,7 +10,7 @@ Source: design of the common contract; the words follow the lecture's block diag
 
 from typing import TYPE_CHECKING, Any
 
-from amaranth.hdl import signed
+from amaranth.hdl import Signal, signed
 from amaranth.lib import data, enum, wiring
 
 __all__ = [
@@ -56,7 +56,18 @@ class ErrorCode(enum.Enum, shape=2):  # pyright: ignore[reportGeneralTypeIssues,
 
 
 class Part(wiring.Component):
-    """A piece of the device: a :class:`~amaranth.lib.wiring.Component` with checked parameters."""
+    """A piece of the device: a :class:`~amaranth.lib.wiring.Component` with checked parameters.
+
+    Attributes
+    ----------
+    intermediates : dict of str to Signal
+        Signals between the registers, by names that the golden model has for them too: a proof of
+        equality goes over them. Empty where it needs none.
+    """
+
+    def __init__(self, signature: Any):
+        super().__init__(signature)
+        self.intermediates: dict[str, Signal] = {}
 
     if TYPE_CHECKING:
         # The members are made from the signature when the part is made.
@@ -113,9 +124,12 @@ def _check_int(what: str, value: int, low: int, high: int) -> None:
         raise ValueError(f"{what} is {value}: choose a whole number from {low} to {high}")
 
 
-def check_width(width: int) -> None:
-    """Raise ``TypeError`` or ``ValueError`` unless ``width`` is a whole number from 4 to 32."""
-    _check_int("width", width, MIN_WIDTH, MAX_WIDTH)
+def check_width(width: int, most: int = MAX_WIDTH) -> None:
+    """Raise ``TypeError`` or ``ValueError`` unless ``width`` is a whole number from 4 to ``most``.
+
+    That is 32, if a method has no limit of its own.
+    """
+    _check_int("width", width, MIN_WIDTH, most)
 
 
 def check_axes(axes: int) -> None:

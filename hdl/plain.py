@@ -1,5 +1,7 @@
 """Plain ports with plain names for any interpolator."""
 
+from collections.abc import Mapping
+
 from amaranth import Module, Signal
 from amaranth.hdl import ShapeCastable, Value
 from amaranth.lib import data, wiring
@@ -23,8 +25,8 @@ class PlainPorts(Part):
     ----------
     core : Part
         The interpolator.
-    observe : bool
-        Also put out every register of the interpolator, under its own name prefixed with ``reg_``.
+    observe : dict of str to Signal
+        Signals inside to put out as well, by name; each name is prefixed with ``reg_``.
 
     Attributes
     ----------
@@ -34,7 +36,7 @@ class PlainPorts(Part):
         Those of them that carry a block, and those that carry a step.
     """
 
-    def __init__(self, core: Part, *, observe: bool = False):
+    def __init__(self, core: Part, *, observe: Mapping[str, Signal] | None = None):
         self.core = core
         self._inner: dict[str, Value] = {}
         members: dict[str, wiring.Member] = {}
@@ -43,11 +45,10 @@ class PlainPorts(Part):
             for name, shape, leaf in _leaves(path, member.shape, value):
                 members[name] = wiring.Member(member.flow, shape)
                 self._inner[name] = leaf
-        if observe:
-            for register_name, register in core.registers.items():
-                name = f"reg_{register_name}"
-                members[name] = wiring.Out(register.shape())
-                self._inner[name] = register
+        for observed_name, signal in (observe or {}).items():
+            name = f"reg_{observed_name}"
+            members[name] = wiring.Out(signal.shape())
+            self._inner[name] = signal
         super().__init__(members)
         self.inputs: dict[str, Signal] = {}
         self.outputs: dict[str, Signal] = {}

@@ -109,7 +109,7 @@ class CompiledModel:
     """
 
     def __init__(self, core: Part, *, watch: tuple[str, ...] = ()):
-        top = PlainPorts(core, observe=True)
+        top = PlainPorts(core, observe=core.registers)
         self.watch = watch
         self.block_fields = top.block_fields
         self.step_fields = top.step_fields

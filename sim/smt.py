@@ -209,16 +209,18 @@ class Rtl:
     ----------
     transition : list of z3.BoolRef
         What ties the symbols together: the device makes one clock.
-    inputs, outputs, registers : dict of str to (width, signed)
-        The plain ports without ``rst``, and the registers.
+    inputs, outputs, registers, intermediates : dict of str to (width, signed)
+        The plain ports without ``rst``, the registers, and the signals between them that have a
+        name.
     flip_flops : int
         Bits of state that Yosys found, named or not.
     """
 
     def __init__(self, core: Part):
-        top = PlainPorts(core, observe=True)
+        top = PlainPorts(core, observe=core.registers | core.intermediates)
         self.inputs = _kinds(top.inputs)
         self.registers = _kinds(core.registers)
+        self.intermediates = _kinds(core.intermediates)
         self.outputs = {
             name: kind for name, kind in _kinds(top.outputs).items() if not name.startswith("reg_")
         }
@@ -228,7 +230,8 @@ class Rtl:
         for state, mark in (("before", ""), ("after", "'")):
             lines.append(f"(declare-fun |{state}| () |design_s|)")
             observed = [(name, name, kind) for name, kind in (self.inputs | self.outputs).items()]
-            observed += [(f"reg_{name}", name, kind) for name, kind in self.registers.items()]
+            inside = self.registers | self.intermediates
+            observed += [(f"reg_{name}", name, kind) for name, kind in inside.items()]
             observed.append(("rst", "rst", (1, False)))
             for port, name, (bits, _) in observed:
                 # An output that is a register too, such as `done`, is named once for each.
@@ -302,6 +305,27 @@ def equivalence(core: Part, golden: Any) -> list[Obligation]:
         for name, (bits, signed) in rtl.outputs.items()
     }
     after = symbols(rtl.registers, width, "'")
+    clock = [*rtl.transition, rtl.rst == 0]
+    named_values = symbols(rtl.intermediates, width)
+    reckoned: dict = {}
+
+    def name(key: str, value: Any) -> Any:
+        """Note what the golden model reckons; it goes on with what the RTL has."""
+        reckoned[key] = value
+        return named_values[key]
+
+    if named_values:
+        expected = golden.step(state, inputs, name)
+        between = [
+            Obligation(
+                f"RTL = golden: every value between the registers that has a name ("
+                f"{len(named_values)}), for all states and inputs, from the ones before it",
+                clock,
+                same(named_values, reckoned),
+            )
+        ]
+    else:
+        expected, between = golden.step(state, inputs), []
     return [
         Obligation(
             f"no hidden state: as many flip-flops in the RTL ({rtl.flip_flops}) as bits in the "
@@ -309,10 +333,11 @@ def equivalence(core: Part, golden: Any) -> list[Obligation]:
             [],
             [z3.BoolVal(rtl.flip_flops == named and rtl.registers == golden.registers())],
         ),
+        *between,
         Obligation(
             "RTL = golden: every register after one clock, for all states and inputs",
-            [*rtl.transition, rtl.rst == 0],
-            same(after, golden.step(state, inputs)),
+            clock,
+            same(after, expected),
         ),
         Obligation(
             "RTL = golden: every output, for all states",

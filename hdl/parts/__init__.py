@@ -7,6 +7,7 @@ from discreta.hdl.parts.position_register import PositionRegister
 from discreta.hdl.parts.radius_meter import RadiusMeter
 from discreta.hdl.parts.remaining_counter import RemainingCounter
 from discreta.hdl.parts.scale_converter import ScaleConverter
+from discreta.hdl.parts.step_adder import StepAdder
 from discreta.hdl.parts.summator import PRELOADS, Summator
 
 __all__ = [
@@ -18,5 +19,6 @@ __all__ = [
     "RadiusMeter",
     "RemainingCounter",
     "ScaleConverter",
+    "StepAdder",
     "Summator",
 ]

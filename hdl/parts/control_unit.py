@@ -19,9 +19,10 @@ class ControlUnit(Part):
     - ``clock`` (a clock pulse for the summators): a block runs and no step waits, or the one that
       waits is taken in this clock.
     - A block ends with the summation after which no axis has steps left (``ending``). Its last step
-      then waits with nothing running: that is how ``last`` is known.
-    - ``done`` (край) is 1 for the one clock after the last step was taken, or after the start of an
-      empty block; ``error`` holds a code for the one clock after the start of a block with a fault.
+      then waits with nothing running: that is how ``last`` is known. ``stepless``, given with
+      ``ending``, says that this summation puts out no step.
+    - ``done`` (край) is 1 for the one clock after the last step was taken, after the start of an
+      empty block, or after a stepless end; ``error`` holds a code for the one clock after the start of a block with a fault.
       Every block that is started is answered by exactly one of the two, in order, and never two
       blocks in one clock.
     - ``idle``: no block runs and no step waits. ``busy``: a block is pending or it is not idle.
@@ -43,6 +44,7 @@ class ControlUnit(Part):
                 "waiting": In(1),
                 "ready": In(1),
                 "ending": In(1),
+                "stepless": In(1),
                 "start": Out(1),
                 "load": Out(1),
                 "clock": Out(1),
@@ -79,7 +81,11 @@ class ControlUnit(Part):
             self.error.eq(self.error_register),
         ]
         m.d.sync += [
-            self.done_register.eq((self.taken & self.last) | (self.load & self.empty)),
+            self.done_register.eq(
+                (self.taken & self.last)
+                | (self.load & self.empty)
+                | (self.clock & self.ending & self.stepless)
+            ),
             self.error_register.eq(ErrorCode.NONE),
         ]
         with m.If(self.load):

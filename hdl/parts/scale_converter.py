@@ -1,12 +1,13 @@
 """The scale converter (мащабен преобразувател): a derivative of the curve, P·x + Q·y + R."""
 
 from amaranth import Module, Mux, Signal
-from amaranth.hdl import Value, signed
+from amaranth.hdl import signed
 from amaranth.lib.wiring import In
 
 from discreta.hdl.contract import Part, check_width
+from discreta.hdl.parts.step_adder import times
 
-__all__ = ["ScaleConverter", "coefficient_bits", "derivative_bits", "linear_bits", "times"]
+__all__ = ["ScaleConverter", "coefficient_bits", "derivative_bits", "linear_bits"]
 
 
 def coefficient_bits(width: int) -> int:
@@ -26,11 +27,6 @@ def derivative_bits(width: int) -> int:
     4), together at most 2.5·2^(2n + 4) < 2^(2n + 6): no block makes it wrap.
     """
     return 2 * width + 7
-
-
-def times(step: Value, value: Value) -> Value:
-    """Multiply a value by a step, −1, 0 or +1."""
-    return Mux(step[0], Mux(step[1], -value, value), 0)
 
 
 class ScaleConverter(Part):

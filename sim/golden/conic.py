@@ -1,10 +1,28 @@
-"""Golden model of the interpolator of second-order curves, one clock at a time. WIP"""
+"""Golden model of the interpolator of second-order curves, one clock at a time, in integers.
 
+Written from the lecture's general block diagram: two coordinate registers, two summators with carry
+and borrow, and the scale converters of A, B, C, D and E, with x' = −(Bx + 2Cy + E) and y' = 2Ax +
+By + D (of the two printed forms of the first the one that the differential of the curve supports,
+and with the minus sign that is lost there). Beyond the lecture, as described of
+``discreta.hdl.conic.Conic``: the sign of the direction, the pieces between two changes of direction
+of an axis and their order, the common scale, the preload, the guard bits, the derivatives kept up
+by additions, the completing steps and the code for a curve that has no direction or is too sharp.
+
+The same source runs on integers, NumPy arrays and SMT bit-vectors (see
+:mod:`discreta.sim.golden.logic`). It knows nothing of the RTL. State and inputs are dicts by
+register and port name.
+
+Registers: as in the block diagram, and ``running``, ``done``, ``error`` of УУ, ``pulse_x/y`` and
+``direction_x/y`` of the step that waits, ``held``, ``fault`` and ``tick`` of the block that is being
+prepared, which happens in the registers in which it runs.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from discreta.sim.golden.logic import Value, equal, less, negate, where
 
-__all__ = ["Conic"]
+__all__ = ["TURNS_BITS", "Conic"]
 
 State = dict[str, Value]
 
@@ -12,9 +30,17 @@ SHARP = 3
 TURNS_BITS = 11
 
 
+def _keep(_name: str, value: Value) -> Value:
+    """Reckon with a value itself."""
+    return value
+
+
 @dataclass(frozen=True)
 class Conic:
-    """The interpolator of second-order curves of n = ``width`` bits."""
+    """The interpolator of second-order curves of n = ``width`` bits, 4 to 24.
+
+    Parameters as for ``discreta.hdl.conic.Conic``.
+    """
 
     width: int = 16
     order: str = "implicit"
@@ -23,12 +49,12 @@ class Conic:
 
     @property
     def bits(self) -> int:
-        """Bits of the derivatives."""
+        """Bits of the derivatives, signed."""
         return 2 * self.width + 7
 
     @property
     def modulus(self) -> int:
-        """M."""
+        """M: a full sum is a step."""
         return 2 ** (self.bits - 1 + self.guard)
 
     @property
@@ -85,8 +111,15 @@ class Conic:
             out[f"steps_{k}"] = where(state[f"pulse_{k}"], where(state[f"direction_{k}"], -1, 1), 0)
         return out
 
-    def step(self, state: State, inputs: dict[str, Value]) -> State:
-        """Give the state after one clock."""
+    def step(
+        self, state: State, inputs: dict[str, Value], name: Callable[[str, Value], Value] = _keep
+    ) -> State:
+        """Give the state after one clock.
+
+        ``inputs``: ``blocks_valid``, ``blocks_a`` … ``blocks_e``, ``blocks_start_x/y``,
+        ``blocks_end_x/y``, ``blocks_clockwise``, ``blocks_turns``, ``steps_ready``. ``name`` is told
+        every value between the registers that has a name, and gives what is reckoned with instead.
+        """
         n = self.width
         outputs = self.outputs(state)
         waiting = outputs["steps_valid"]
@@ -102,18 +135,17 @@ class Conic:
         accept = inputs["blocks_valid"] & outputs["blocks_ready"]
         clock = state["running"] & free
 
-        after = self._run(state, clock, load)
-        finished = after.pop("finished")
-        for k in "xy":
+        after = self._run(state, clock, load, name)
+        finished, stepless = (after.pop(name) for name in ("finished", "stepless"))
+        # The position moves with the step that is taken, not with the one that waits.
+        for k, p in (("x", "p1"), ("y", "p2")):
             move = where(state[f"direction_{k}"], -1, 1)
             moved = state[f"{k}t"] + where(taken & state[f"pulse_{k}"], move, 0)
-            after[f"{k}t"] = where(
-                load, state[{"x": "p1", "y": "p2"}[k]], self._signed(moved, n + 1)
-            )
+            after[f"{k}t"] = where(load, state[p], self._signed(moved, n + 1))
             kept = where(taken, 0, state[f"pulse_{k}"])
             after[f"pulse_{k}"] = where(clock, after[f"pulse_{k}"], kept)
         after["running"] = where(load, negate(empty), where(finished, 0, state["running"]))
-        after["done"] = (taken & negate(state["running"])) | (load & empty)
+        after["done"] = (taken & negate(state["running"])) | (load & empty) | stepless
         after["error"] = where(start, state["fault"], 0)
 
         # Preparation: Horner's rule, bit by bit; the top bit of a coordinate counts down.
@@ -132,8 +164,8 @@ class Conic:
             turned = self._signed(2 * state[p] + ((state[p] >> n) & 1), n + 1)
             after[p] = where(multiplies, turned, after[p])
         size = _size(state["gx"]) + _size(state["gy"])
-        bend = 2 * (_size(a) + _size(b) + _size(c))
-        sharp = negate(empty) & (less(size, 2 * bend) | equal(size, 0))
+        bend = _size(a) + _size(b) + _size(c)
+        sharp = negate(empty) & (less(size, 4 * bend) | equal(size, 0))
         after["fault"] = where(judges & sharp, SHARP, state["fault"])
         counted = (tick + 1) & (2 ** (n + 3).bit_length() - 1)
         after["tick"] = where(judges | equal(tick, 0), 0, counted)
@@ -154,13 +186,12 @@ class Conic:
         after["held"] = where(accept, 1, where(start, 0, state["held"]))
         return after
 
-    def _run(self, state: State, clock: Value, load: Value) -> State:
+    def _run(self, state: State, clock: Value, load: Value, name: Callable) -> State:
         """One clock pulse of УУ, if there is one, or the start of a block."""
         n, m = self.width, self.modulus
         cw = state["clockwise"]
-        a, b, c = (state[k] for k in "abc")
         gx, gy = state["gx"], state["gy"]
-        last = equal(state["turns"], 0)
+        last, entering = equal(state["turns"], 0), equal(state["turns"], 1)
         fresh = state["fresh"] if self.halves else 0
 
         # x' = −Gy, y' = Gx, or with the clock the other way.
@@ -174,92 +205,122 @@ class Conic:
         goes = {k: negate(still[k]) & negate(below[k] ^ piece[k]) for k in "xy"}
         able = {k: left[k] & negate(state[f"backward_{k}"]) & goes[k] for k in "xy"}
         dead = negate(able["x"] | able["y"])
-        x_first = piece["x"] ^ piece["y"] ^ cw
+        # The gradient turns one way: of two axes one speeds up, the other will turn round.
+        x_speeds_up = piece["x"] ^ piece["y"] ^ cw
         whole = clock & negate(fresh)
-        turn = whole & negate(last) & (dead | negate(where(x_first, goes["y"], goes["x"])))
+        turn = whole & negate(last) & (dead | negate(where(x_speeds_up, goes["y"], goes["x"])))
         sums = whole & negate(turn)
-
-        # An axis that does not go must not hold the other one up.
-        going = [where(able["y"], gx, 0), where(able["x"], gy, 0)]
-        big_gx, big_gy, big_a, big_b, big_c = self._scaled([*going, 2 * a, b, 2 * c])
-        velocity = {"x": where(cw, big_gy, 0 - big_gy), "y": where(cw, 0 - big_gx, big_gx)}
-
-        def add(k: str, more: Value) -> tuple[Value, Value, Value]:
-            """Sum one axis; give the sum without the carry, whether it steps, and the step."""
-            total = state[f"s{k}"] + velocity[k] + more
-            over = where(piece[k], less(total, 0), negate(less(total, m)))
-            hit = sums & able[k] & over
-            move = where(hit, where(piece[k], -1, 1), 0)
-            return total - where(hit, where(piece[k], -m, m), 0), hit, move
-
-        def changed(k: str, by: Value, times: Value) -> Value:
-            """What ``by`` times a step changes in the velocity of axis k."""
-            value = where(equal(times, 0), 0, where(less(times, 0), 0 - by, by))
-            return where(cw ^ (1 if k == "x" else 0), 0 - value, value)
-
-        plans = {}
-        for first, second in ("xy", "yx"):
-            one, hit_one, move_one = add(first, 0)
-            more: Value = 0
-            if self.order != "simultaneous":
-                more = changed(second, big_a if second == "y" else big_c, move_one)
-            two, hit_two, move_two = add(second, more)
-            if self.order == "implicit":
-                two = two + changed(second, big_b, move_two)
-            plans[first] = {first: (one, hit_one), second: (two, hit_two)}
-        if self.order == "simultaneous":
-            plans["y"] = plans["x"]
+        halving = clock & fresh
 
         after = dict(state)
-        complete = sums & last & dead
-        step, move = {}, {}
-        bent = negate(equal(a, 0) & equal(b, 0) & equal(c, 0))
-        wide = self.bits + self.guard + 1
-        for k in "xy":
-            total = where(x_first, plans["x"][k][0], plans["y"][k][0])
-            hit = where(x_first, plans["x"][k][1], plans["y"][k][1])
-            after[f"s{k}"] = where(sums & able[k], self._signed(total, wide), state[f"s{k}"])
-            step[k] = hit | (complete & left[k])
-            move[k] = where(step[k], where(state[f"direction_{k}"], -1, 1), 0)
-            if self.halves:
-                mine = x_first if k == "x" else negate(x_first)
-                half = self._signed(state[f"s{k}"] - (velocity[k] >> 1), wide)
-                after[f"s{k}"] = where(clock & fresh & bent & mine, half, after[f"s{k}"])
+        hit = self._sum(state, after, able, piece, x_speeds_up, sums, halving, name)
         if self.halves:
             after["fresh"] = where(load, 1, where(clock, 0, fresh))
-        low = 2 ** (n + 1) - 1
-        for p, count, k in (("p1", "p3", "x"), ("p2", "p4", "y")):
+        complete = sums & last & dead
+        step, move = {}, {}
+        for k, p, count in (("x", "p1", "p3"), ("y", "p2", "p4")):
+            step[k] = hit[k] | (complete & left[k])
+            move[k] = where(step[k], where(state[f"direction_{k}"], -1, 1), 0)
             after[p] = self._signed(state[p] + move[k], n + 1)
-            after[count] = (state[count] - step[k]) & low
+            after[count] = state[count] - step[k]
             after[f"pulse_{k}"] = step[k]
-
-        def times(by: Value, k: str) -> Value:
-            return where(equal(move[k], 0), 0, where(less(move[k], 0), 0 - by, by))
-
-        after["gx"] = self._signed(gx + times(2 * a, "x") + times(b, "y"), self.bits)
-        after["gy"] = self._signed(gy + times(b, "x") + times(2 * c, "y"), self.bits)
-        finished = clock & last & equal(after["p3"], 0) & equal(after["p4"], 0)
+        for g, x_scale, y_scale in (
+            ("gx", 2 * state["a"], state["b"]),
+            ("gy", state["b"], 2 * state["c"]),
+        ):
+            moved = state[g] + _times(move["x"], x_scale) + _times(move["y"], y_scale)
+            after[g] = self._signed(moved, self.bits)
 
         # A new piece: which way, and how far.
         first_way = {
             "x": where(still["x"], negate(below["y"]) ^ cw, below["x"]),
             "y": where(still["y"], below["x"] ^ cw, below["y"]),
         }
-        slows = {"x": negate(x_first), "y": x_first}
-        final = where(load, last, equal(state["turns"], 1))
-        enters = load | turn
+        turns_round = {"x": negate(x_speeds_up), "y": x_speeds_up}
+        final = where(load, last, entering)
+        here, lands = {}, {}
         for k, p, end, count in (("x", "p1", "xk", "p3"), ("y", "p2", "yk", "p4")):
-            ahead = where(load, first_way[k], piece[k] ^ slows[k])
+            ahead = where(load, first_way[k], piece[k] ^ turns_round[k])
             way = state[end] - state[p]
-            back = final & negate(equal(way, 0)) & (less(way, 0) ^ ahead)
+            here[k], lands[k] = equal(way, 0), equal(way, move[k])
+            back = final & negate(here[k]) & (less(way, 0) ^ ahead)
             room = where(ahead, state[p] + 2**n, 2**n - 1 - state[p])
-            after[count] = where(enters, where(final, _size(way), room), after[count])
-            after[f"backward_{k}"] = where(enters, back, state[f"backward_{k}"])
-            after[f"direction_{k}"] = where(enters, ahead ^ back, state[f"direction_{k}"])
+            loaded = {
+                count: where(final, _size(way), room),
+                f"backward_{k}": back,
+                f"direction_{k}": ahead ^ back,
+            }
+            for name, value in loaded.items():
+                after[name] = where(load | turn, value, after[name])
             initial = where(ahead, m - 1 - self.initial_sum, self.initial_sum)
             after[f"s{k}"] = where(load, initial, after[f"s{k}"])
         after["turns"] = (state["turns"] - turn) & (2**TURNS_BITS - 1)
-        return after | {"finished": finished}
+
+        # The end, by a step or, when the last change of direction finds it reached, without one.
+        stepless = turn & entering & here["x"] & here["y"]
+        arrived = sums & (last | entering) & lands["x"] & lands["y"]
+        return after | {"finished": arrived | stepless, "stepless": stepless}
+
+    def _sum(
+        self,
+        state: State,
+        after: State,
+        able: State,
+        piece: State,
+        x_speeds_up: Value,
+        sums: Value,
+        halving: Value,
+        name: Callable,
+    ) -> State:
+        """Sum both axes, the one that speeds up first; give which of them step."""
+        m, cw = self.modulus, state["clockwise"]
+        a, b, c = (state[k] for k in "abc")
+        # An axis that does not go must not hold the other one up.
+        going = [where(able["y"], state["gx"], 0), where(able["x"], state["gy"], 0)]
+        scaled = self._scaled([*going, 2 * a, b, 2 * c])
+        names = ("gx", "gy", "2a", "b", "2c")
+        gx, gy, a2, b1, c2 = (name(f"scaled_{k}", v) for k, v in zip(names, scaled, strict=True))
+        velocity = {"x": where(cw, gy, 0 - gy), "y": where(cw, 0 - gx, gx)}
+        x_first = 1 if self.order == "simultaneous" else x_speeds_up
+        opposite = negate(x_first) ^ cw
+
+        change: Value = 0
+        own: Value = 0
+        speeds, hits, rests, cans = [], [], [], []
+        for which, x_now in (("first", x_first), ("second", negate(x_first))):
+            speed = name(f"{which}_velocity", where(x_now, velocity["x"], velocity["y"]))
+            total = name(f"{which}_total", where(x_now, state["sx"], state["sy"]) + speed + change)
+            down = where(x_now, piece["x"], piece["y"])
+            can = sums & where(x_now, able["x"], able["y"])
+            hit = can & where(down, less(total, 0), negate(less(total, m)))
+            step = name(f"{which}_step", where(hit, where(down, -1, 1), 0))
+            if which == "second" and self.order == "implicit":
+                own = where(opposite, 0 - b1, b1)
+            own = name(f"{which}_own", own)
+            rest = total - name(f"{which}_carried", _times(step, m - own))
+            rest = name(f"{which}_unlimited", rest)
+            rest = where(less(rest, 2 * m), rest, 2 * m - 1)
+            rest = name(f"{which}_rest", where(less(rest, -2 * m), -2 * m, rest))
+            if which == "first" and self.order != "simultaneous":
+                # What the first axis's step changes in y' = Gx, or in x' = −Gy.
+                cross = _times(step, where(x_first, a2, c2))
+                change = where(opposite, 0 - cross, cross)
+            speeds.append(speed)
+            rests.append(rest)
+            hits.append(step & 1)
+            cans.append(can)
+
+        wide = self.bits + self.guard + 1
+        bent = negate(equal(a, 0) & equal(b, 0) & equal(c, 0))
+        hit = {}
+        for k, now in (("x", x_first), ("y", negate(x_first))):
+            first, second = (where(can, rest, state[f"s{k}"]) for can, rest in zip(cans, rests, strict=True))
+            after[f"s{k}"] = where(now, first, second)
+            hit[k] = where(now, *hits)
+            if self.halves:
+                half = self._signed(state[f"s{k}"] - (speeds[0] >> 1), wide)
+                after[f"s{k}"] = where(halving & bent & now, half, after[f"s{k}"])
+        return hit
 
     def _scaled(self, values: list[Value]) -> list[Value]:
         """Shift numbers left together until one of them would lose its sign."""
@@ -283,3 +344,8 @@ class Conic:
 
 def _size(value: Value) -> Value:
     return where(less(value, 0), 0 - value, value)
+
+
+def _times(step: Value, value: Value) -> Value:
+    """Multiply by a step: −1, 0 or 1."""
+    return where(equal(step, 0), 0, where(less(step, 0), 0 - value, value))

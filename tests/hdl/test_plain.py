@@ -75,7 +75,8 @@ def test_ports(letters):
 
 
 def test_ports_of_the_circular():
-    top = PlainPorts(Circular(8), observe=True)
+    core = Circular(8)
+    top = PlainPorts(core, observe=core.registers)
     coordinate, move = signed(9), signed(2)
     fields = [
         *((f"{point}_{a}", coordinate) for point in ("start", "end", "center") for a in "xy"),
@@ -134,7 +135,7 @@ def test_ports_of_the_circular():
 )
 def test_observe_puts_out_every_register(letters, own):
     core = Linear(8, len(letters))
-    top = PlainPorts(core, observe=True)
+    top = PlainPorts(core, observe=core.registers)
     per_axis = ("pulse", "direction", "start", "delta", "negative")
     names = {*own.split(), "running", "done", "error", "pending", "fault"}
     names |= {f"{name}_{a}" for name in per_axis for a in letters}
