@@ -92,8 +92,11 @@ class Conic(Part):
 
     The end: on entering the last piece the counters are loaded with the way to the end. An axis for
     which that leads back has overshot, is ``backward`` and stands still. The block ends when no
-    steps are left. When none of those left would move any more, they are put out as completing
-    steps, one of an axis a clock: a block always ends on its end point.
+    steps are left, or with a step that lands on the end while one change of direction is to come.
+    When none of the axes with steps left would move any more, these are put out as completing
+    steps, one of an axis a clock: a block always ends on its end point. (Should the last change of
+    direction, in a block with wrong ``turns``, find the end reached already, ``done`` follows at
+    once and no step was ``last``.)
 
     Latency: a block accepted in clock 0 is prepared from clock 1 to n + 3, started in clock n + 4
     and summed from the clock after (with the half increment from the one after that). A carry is a
@@ -106,12 +109,15 @@ class Conic(Part):
     Steps: ``steps`` holds a step until it is taken and everything waits for it. ``position`` shows
     the steps taken, not the one that waits; starting a block loads it with the block's start.
 
-    Reset: everything 0, nothing held, position at the origin.
+    Reset: everything 0 (the summators their preload), nothing held, position at the origin.
 
-    Overflow: none: with coefficients of n + 4 and 2n + 5 bits the derivatives have 2n + 7 bits, and
-    no axis goes beyond −2^n … 2^n − 1. ``error`` is ``SHARP`` for one clock, in place of ``done``,
-    when both derivatives are 0 at the start, or \|Gx\| + \|Gy\| < 4·(\|A\| + \|B\| + \|C\|): the
-    radius of curvature may be below two steps there. Nothing moves and the next block runs as ever.
+    Overflow: none, whatever the block is. With A, B, C of n + 4 and D, E of 2n + 5 bits, signed,
+    the derivatives fit their 2n + 7 bits at every point; no axis goes beyond −2^n … 2^n − 1; a
+    summator has 2n + 8 + g bits, −2M … 2M − 1, and stays at a limit that it would go beyond, which
+    only happens where a curve is too sharp for the grid. ``error`` is ``SHARP`` for one clock, in
+    place of ``done``, when both derivatives are 0 at the start, or \|Gx\| + \|Gy\| < 4·(\|A\| +
+    \|B\| + \|C\|): the radius of curvature may be below two steps there. Nothing moves and the next
+    block runs as ever.
 
     Error bound: none is proven; see docs/conic.md for what was measured.
 
@@ -129,7 +135,7 @@ class Conic(Part):
     preload : str
         What the summators start from: ``"zero"`` or ``"half"`` (of M).
     guard : int
-        g, 0 to 4: each bit halves the increments and doubles the clocks.
+        g, 0 to 4: each bit halves the increments, for less error in twice the clocks.
 
     Attributes
     ----------
@@ -148,7 +154,7 @@ class Conic(Part):
         A parameter is not one of the above.
     """
 
-    LECTURE: ClassVar[dict[str, object]] = {"order": "simultaneous", "preload": "zero", "guard": 0}
+    LECTURE: ClassVar[dict[str, Any]] = {"order": "simultaneous", "preload": "zero", "guard": 0}
 
     def __init__(
         self, width: int = 16, *, order: str = "implicit", preload: str = "half", guard: int = 2

@@ -22,9 +22,9 @@ class ControlUnit(Part):
       then waits with nothing running: that is how ``last`` is known. ``stepless``, given with
       ``ending``, says that this summation puts out no step.
     - ``done`` (край) is 1 for the one clock after the last step was taken, after the start of an
-      empty block, or after a stepless end; ``error`` holds a code for the one clock after the start of a block with a fault.
-      Every block that is started is answered by exactly one of the two, in order, and never two
-      blocks in one clock.
+      empty block, or after a stepless end; ``error`` holds a code for the one clock after the start
+      of a block with a fault. Every block that is started is answered by exactly one of the two, in
+      order, and never two blocks in one clock.
     - ``idle``: no block runs and no step waits. ``busy``: a block is pending or it is not idle.
 
     Latency: ``start``, ``load``, ``clock``, ``taken`` and ``last`` in the same clock, ``done`` and

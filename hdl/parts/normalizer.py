@@ -64,9 +64,10 @@ class Normalizer(Part):
             stage = {letter: Signal(shape, name=f"{letter}_{places}") for letter in letters}
             free = Signal(name=f"free_{places}")
             if self.signed:
-                # A bit that differs from the next lower one among those that would go, and the new sign.
+                # Among the bits that would go and the new sign, one that differs from the next.
                 tops = (
-                    (values[a] ^ (values[a] << 1))[self.width - places : self.width] for a in letters
+                    (values[a] ^ (values[a] << 1))[self.width - places : self.width]
+                    for a in letters
                 )
             else:
                 tops = (values[letter][self.width - places :] for letter in letters)

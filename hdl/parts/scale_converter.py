@@ -23,8 +23,8 @@ def linear_bits(width: int) -> int:
 def derivative_bits(width: int) -> int:
     """Give the bits of a derivative, signed: 2n + 7.
 
-    With coordinates of n + 1 bits \\|2A·x\\| ≤ 2^(2n + 4), \\|B·y\\| ≤ 2^(2n + 3) and \\|D\\| ≤ 2^(2n +
-    4), together at most 2.5·2^(2n + 4) < 2^(2n + 6): no block makes it wrap.
+    With coordinates of n + 1 bits \\|2A·x\\| ≤ 2^(2n + 4), \\|B·y\\| ≤ 2^(2n + 3) and \\|D\\| ≤
+    2^(2n + 4), together at most 2.5·2^(2n + 4) < 2^(2n + 6): no block makes it wrap.
     """
     return 2 * width + 7
 
@@ -33,17 +33,17 @@ class ScaleConverter(Part):
     """Keeps G = P·x + Q·y + R for the point (x, y), in both shapes that it can have.
 
     - Multiplying, as in the lecture, but bit by bit: after ``clear``, every clock with ``multiply``
-      takes one bit of x and one of y, the top ones first, and makes G := 2·G + P·(bit of x) + Q·(bit
-      of y); the very first bit is the sign's and counts down (``sign``). After n + 1 such clocks G
-      is P·x + Q·y, and a clock with ``add`` makes it P·x + Q·y + R.
+      takes one bit of x and one of y, the top ones first, and makes G := 2·G + P·(bit of x) +
+      Q·(bit of y); the very first bit is the sign's and counts down (``sign``). After n + 1 such
+      clocks G is P·x + Q·y, and a clock with ``add`` makes it P·x + Q·y + R.
     - Incremental: a clock with ``move`` makes G := G + P·(step of x) + Q·(step of y), with steps of
       −1, 0 or +1. That is all that the loop needs, and there is no multiplier in it.
 
     The two shapes give the same: this is proven, see docs/conic.md.
 
     Latency: ``register`` follows at the clock's edge; n + 2 clocks from ``clear`` to G. Throughput:
-    a step a clock. Only one of ``clear``, ``multiply``, ``add`` and ``move`` may be given at a time;
-    the first of them goes before the others. Reset: 0.
+    a step a clock. Of ``clear``, ``multiply``, ``add`` and ``move`` given together the first is done
+    and the others are not. Reset: 0.
     Overflow: wraps; G has 2n + 7 bits, so that no point and no coefficients make it wrap. Error:
     none.
     Source: lecture, block diagram of the general interpolator (scale converters as multipliers for
@@ -52,8 +52,8 @@ class ScaleConverter(Part):
     Parameters
     ----------
     width : int
-        n, 4 to 32: coordinates are signed, n + 1 bits. P and Q (2A and B, or B and 2C) are signed, n
-        + 5 bits, R (D or E) is signed, 2n + 5 bits.
+        n, 4 to 32: coordinates are signed, n + 1 bits. P and Q (2A and B, or B and 2C) are signed,
+        n + 5 bits, R (D or E) is signed, 2n + 5 bits.
     name : str
         Name of the register in waveforms.
 

@@ -50,8 +50,8 @@ class StepAdder(Part):
     def __init__(self, velocity_bits: int, modulus_bits: int):
         if modulus_bits < velocity_bits - 2:
             raise ValueError(
-                f"modulus has {modulus_bits} bits: velocities of {velocity_bits} bits need at least "
-                f"{velocity_bits - 2}"
+                f"modulus has {modulus_bits} bits: velocities of {velocity_bits} bits need at "
+                f"least {velocity_bits - 2}"
             )
         velocity, total = signed(velocity_bits), signed(modulus_bits + 2)
         super().__init__(

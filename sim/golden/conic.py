@@ -13,8 +13,8 @@ The same source runs on integers, NumPy arrays and SMT bit-vectors (see
 register and port name.
 
 Registers: as in the block diagram, and ``running``, ``done``, ``error`` of УУ, ``pulse_x/y`` and
-``direction_x/y`` of the step that waits, ``held``, ``fault`` and ``tick`` of the block that is being
-prepared, which happens in the registers in which it runs.
+``direction_x/y`` of the step that waits, ``held``, ``fault`` and ``tick`` of the block that is
+being prepared, which happens in the registers in which it runs.
 """
 
 from collections.abc import Callable
@@ -112,13 +112,14 @@ class Conic:
         return out
 
     def step(
-        self, state: State, inputs: dict[str, Value], name: Callable[[str, Value], Value] = _keep
+        self, state: State, inputs: dict[str, Value], tell: Callable[[str, Value], Value] = _keep
     ) -> State:
         """Give the state after one clock.
 
         ``inputs``: ``blocks_valid``, ``blocks_a`` … ``blocks_e``, ``blocks_start_x/y``,
-        ``blocks_end_x/y``, ``blocks_clockwise``, ``blocks_turns``, ``steps_ready``. ``name`` is told
-        every value between the registers that has a name, and gives what is reckoned with instead.
+        ``blocks_end_x/y``, ``blocks_clockwise``, ``blocks_turns``, ``steps_ready``. ``tell`` is
+        told every value between the registers that has a name, and gives what is reckoned with
+        instead.
         """
         n = self.width
         outputs = self.outputs(state)
@@ -135,7 +136,7 @@ class Conic:
         accept = inputs["blocks_valid"] & outputs["blocks_ready"]
         clock = state["running"] & free
 
-        after = self._run(state, clock, load, name)
+        after = self._run(state, clock, load, tell)
         finished, stepless = (after.pop(name) for name in ("finished", "stepless"))
         # The position moves with the step that is taken, not with the one that waits.
         for k, p in (("x", "p1"), ("y", "p2")):
@@ -186,7 +187,7 @@ class Conic:
         after["held"] = where(accept, 1, where(start, 0, state["held"]))
         return after
 
-    def _run(self, state: State, clock: Value, load: Value, name: Callable) -> State:
+    def _run(self, state: State, clock: Value, load: Value, tell: Callable) -> State:
         """One clock pulse of УУ, if there is one, or the start of a block."""
         n, m = self.width, self.modulus
         cw = state["clockwise"]
@@ -213,7 +214,7 @@ class Conic:
         halving = clock & fresh
 
         after = dict(state)
-        hit = self._sum(state, after, able, piece, x_speeds_up, sums, halving, name)
+        hit = self._sum(state, after, able, piece, x_speeds_up, sums, halving, tell)
         if self.halves:
             after["fresh"] = where(load, 1, where(clock, 0, fresh))
         complete = sums & last & dead
@@ -270,7 +271,7 @@ class Conic:
         x_speeds_up: Value,
         sums: Value,
         halving: Value,
-        name: Callable,
+        tell: Callable,
     ) -> State:
         """Sum both axes, the one that speeds up first; give which of them step."""
         m, cw = self.modulus, state["clockwise"]
@@ -279,7 +280,7 @@ class Conic:
         going = [where(able["y"], state["gx"], 0), where(able["x"], state["gy"], 0)]
         scaled = self._scaled([*going, 2 * a, b, 2 * c])
         names = ("gx", "gy", "2a", "b", "2c")
-        gx, gy, a2, b1, c2 = (name(f"scaled_{k}", v) for k, v in zip(names, scaled, strict=True))
+        gx, gy, a2, b1, c2 = (tell(f"scaled_{k}", v) for k, v in zip(names, scaled, strict=True))
         velocity = {"x": where(cw, gy, 0 - gy), "y": where(cw, 0 - gx, gx)}
         x_first = 1 if self.order == "simultaneous" else x_speeds_up
         opposite = negate(x_first) ^ cw
@@ -288,19 +289,19 @@ class Conic:
         own: Value = 0
         speeds, hits, rests, cans = [], [], [], []
         for which, x_now in (("first", x_first), ("second", negate(x_first))):
-            speed = name(f"{which}_velocity", where(x_now, velocity["x"], velocity["y"]))
-            total = name(f"{which}_total", where(x_now, state["sx"], state["sy"]) + speed + change)
+            speed = tell(f"{which}_velocity", where(x_now, velocity["x"], velocity["y"]))
+            total = tell(f"{which}_total", where(x_now, state["sx"], state["sy"]) + speed + change)
             down = where(x_now, piece["x"], piece["y"])
             can = sums & where(x_now, able["x"], able["y"])
             hit = can & where(down, less(total, 0), negate(less(total, m)))
-            step = name(f"{which}_step", where(hit, where(down, -1, 1), 0))
+            step = tell(f"{which}_step", where(hit, where(down, -1, 1), 0))
             if which == "second" and self.order == "implicit":
                 own = where(opposite, 0 - b1, b1)
-            own = name(f"{which}_own", own)
-            rest = total - name(f"{which}_carried", _times(step, m - own))
-            rest = name(f"{which}_unlimited", rest)
+            own = tell(f"{which}_own", own)
+            rest = total - tell(f"{which}_carried", _times(step, m - own))
+            rest = tell(f"{which}_unlimited", rest)
             rest = where(less(rest, 2 * m), rest, 2 * m - 1)
-            rest = name(f"{which}_rest", where(less(rest, -2 * m), -2 * m, rest))
+            rest = tell(f"{which}_rest", where(less(rest, -2 * m), -2 * m, rest))
             if which == "first" and self.order != "simultaneous":
                 # What the first axis's step changes in y' = Gx, or in x' = −Gy.
                 cross = _times(step, where(x_first, a2, c2))
@@ -314,7 +315,9 @@ class Conic:
         bent = negate(equal(a, 0) & equal(b, 0) & equal(c, 0))
         hit = {}
         for k, now in (("x", x_first), ("y", negate(x_first))):
-            first, second = (where(can, rest, state[f"s{k}"]) for can, rest in zip(cans, rests, strict=True))
+            first, second = (
+                where(can, rest, state[f"s{k}"]) for can, rest in zip(cans, rests, strict=True)
+            )
             after[f"s{k}"] = where(now, first, second)
             hit[k] = where(now, *hits)
             if self.halves:
