@@ -42,8 +42,8 @@ class ScaleConverter(Part):
     The two shapes give the same: this is proven, see docs/conic.md.
 
     Latency: ``register`` follows at the clock's edge; n + 2 clocks from ``clear`` to G. Throughput:
-    a step a clock. Of ``clear``, ``multiply``, ``add`` and ``move`` given together the first is done
-    and the others are not. Reset: 0.
+    a step a clock. Of ``clear``, ``multiply``, ``add`` and ``move`` given together the first is
+    done and the others are not. Reset: 0.
     Overflow: wraps; G has 2n + 7 bits, so that no point and no coefficients make it wrap. Error:
     none.
     Source: lecture, block diagram of the general interpolator (scale converters as multipliers for
