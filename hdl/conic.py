@@ -80,11 +80,15 @@ class Conic(Part):
     changes afterwards; the area stays, whatever B is.
 
     Preload: the summators start from 0 or M/2 when their axis rises, from the complement when it
-    falls. With M/2, and not in order simultaneous, half of the first increment is taken off the sum
-    that is added to first, unless the curve is a straight line.
+    falls. With M/2, and not in order simultaneous, the very first increment of the axis that is
+    added to first is half as large, unless the curve is a straight line: that axis is then half a
+    summation before the other one, as it must be for the path to be true.
 
     Scale: before every summation Gx, Gy and with them 2A, B, 2C are shifted left together until one
-    has its top bit set. A derivative of which the axis does not go counts as 0 there.
+    has its top bit set. A derivative of which the axis does not go counts as 0 there. When s has
+    changed by 1 since the last summation, the axis that is added to first (but for order
+    simultaneous and straight lines) adds the mean of both scales: 3/2 or 3/4 of its increment, so
+    that it stays half a summation before the other one.
 
     Registers: P1, P2 = x, y; GX, GY; SX, SY; P3, P4 = steps left of x and y in this piece (in the
     last one those to the end, before it those to the edge of the coordinates); A…E; XT, YT =
@@ -99,8 +103,7 @@ class Conic(Part):
     once and no step was ``last``.)
 
     Latency: a block accepted in clock 0 is prepared from clock 1 to n + 3, started in clock n + 4
-    and summed from the clock after (with the half increment from the one after that). A carry is a
-    step in the next clock. ``done`` follows the last step by a clock.
+    and summed from the clock after. A carry is a step in the next clock. ``done`` follows the last step by a clock.
 
     Throughput: one summation a clock, and one clock for every change of direction. Blocks are
     accepted when nothing runs or waits: n + 5 clocks lie between the last step of one and the first
@@ -183,7 +186,7 @@ class Conic(Part):
             "preload": preload,
             "guard": guard,
         }
-        self.halves = order != "simultaneous" and preload == "half"
+        self.ordered = order != "simultaneous"
         n, w = width, derivative_bits(width)
         coordinate = signed(n + 1)
         sum_shape = signed(w + guard + 1)
@@ -209,6 +212,7 @@ class Conic(Part):
         self.turns = Signal(TURNS_BITS)
         self.backward = {a: Signal(name=f"backward_{a}") for a in "xy"}
         self.fresh = Signal()
+        self.scale = Signal((derivative_bits(width) - 1).bit_length())
         self.held = Signal()
         self.fault = Signal(ErrorCode)
         self.tick = Signal(range(n + 4), name="tick")
@@ -219,12 +223,14 @@ class Conic(Part):
         self.adders = tuple(StepAdder(bits + 1, bits - 1 + guard) for _ in range(2))
         lanes = zip(("gx", "gy", "2a", "b", "2c"), "xyzab", strict=True)
         self.intermediates = {
+            "places": self.normalizer.places,
             **{f"scaled_{name}": self.normalizer.normalized[lane] for name, lane in lanes},
             **{
                 f"{which}_{name}": signal
                 for which, adder in zip(("first", "second"), self.adders, strict=True)
                 for name, signal in (
                     ("velocity", adder.velocity),
+                    ("change", adder.change),
                     ("total", adder.total),
                     ("step", adder.step),
                     ("own", adder.own),
@@ -246,7 +252,7 @@ class Conic(Part):
             "pieces": [
                 self.turns,
                 *self.backward.values(),
-                *([self.fresh] if self.halves else []),
+                *([self.fresh, self.scale] if self.ordered else []),
                 self.clockwise,
                 self.xk,
                 self.yk,
@@ -310,31 +316,24 @@ class Conic(Part):
         x_first = Signal()
         m.d.comb += x_first.eq(piece["x"] ^ piece["y"] ^ cw)
 
-        # A clock pulse of УУ takes off the half increment, turns an axis round, or sums.
-        halve, whole, turn, add, dead, complete = (
-            Signal(name=name) for name in ("halve", "whole", "turn", "add", "dead", "complete")
+        # A clock pulse of УУ turns an axis round, or sums.
+        turn, add, dead, complete = (
+            Signal(name=name) for name in ("turn", "add", "dead", "complete")
         )
         last, entering = Signal(name="last_piece"), Signal()
         m.d.comb += [
             last.eq(self.turns == 0),
             entering.eq(self.turns == 1),
-            halve.eq(uu.clock & self.fresh),
-            whole.eq(uu.clock & ~self.fresh),
             dead.eq(~able["x"] & ~able["y"]),
-            turn.eq(whole & ~last & (dead | ~Mux(x_first, goes["y"], goes["x"]))),
-            add.eq(whole & ~turn),
+            turn.eq(uu.clock & ~last & (dead | ~Mux(x_first, goes["y"], goes["x"]))),
+            add.eq(uu.clock & ~turn),
             complete.eq(add & last & dead),
         ]
-        if self.halves:
-            with m.If(uu.load):
-                m.d.sync += self.fresh.eq(1)
-            with m.Elif(uu.clock):
-                m.d.sync += self.fresh.eq(0)
         with m.If(turn):
             m.d.sync += self.turns.eq(self.turns - 1)
 
         # Steps: carries and borrows, or what is left when there can be no more of them.
-        hit = self._sum(m, x_first, piece, able, add, halve)
+        hit = self._sum(m, x_first, piece, able, add)
         step = {k: hit[k] | (complete & left[k]) for k in "xy"}
         moves = {}
         for k in "xy":
@@ -396,7 +395,7 @@ class Conic(Part):
         arrived = Signal()
         m.d.comb += [
             empty.eq(last & here["x"] & here["y"]),
-            arrived.eq(add & (last | entering) & lands["x"] & lands["y"]),
+            arrived.eq(add & (step["x"] | step["y"]) & (last | entering) & lands["x"] & lands["y"]),
             uu.stepless.eq(turn & entering & here["x"] & here["y"]),
             uu.ending.eq(arrived | uu.stepless),
         ]
@@ -454,7 +453,7 @@ class Conic(Part):
                 converter.y_step.eq(moves["y"]),
             ]
 
-    def _sum(self, m: Module, x_first, piece, able, add, halve) -> dict[str, Value]:
+    def _sum(self, m: Module, x_first, piece, able, add) -> dict[str, Value]:
         """Sum the velocities of both axes, in their order; give which axes step."""
         a, b, c = (self.coefficients[k] for k in "abc")
         cw, bits = self.clockwise, derivative_bits(self.width)
@@ -487,24 +486,33 @@ class Conic(Part):
                 m.d.sync += sums["x"].eq(adder.rest)
             with m.If(adder.enable & is_y):
                 m.d.sync += sums["y"].eq(adder.rest)
-        if self.order != "simultaneous":
+        if self.ordered:
             # What steps change in the velocity of the second axis: that is y' = Gx, or x' = −Gy.
             opposite = swap ^ cw
             cross = times(earlier.step, Mux(swap, big_c, big_a))
             m.d.comb += [swap.eq(~x_first), later.change.eq(Mux(opposite, -cross, cross))]
             if self.order == "implicit":
                 m.d.comb += later.own.eq(Mux(opposite, -big_b, big_b))
-        if self.halves:
-            # On a straight line neither axis waits for the other.
-            bent = (a != 0) | (b != 0) | (c != 0)
-            halved = Signal.like(self.sx, name="halved")
-            m.d.comb += halved.eq(earlier.sum - (earlier.velocity >> 1))
-            with m.If(halve & bent):
-                with m.If(swap):
-                    m.d.sync += sums["y"].eq(halved)
-                with m.Else():
-                    m.d.sync += sums["x"].eq(halved)
+            self._centre(m, normalizer.places, Mux(swap, velocity["y"], velocity["x"]), add)
         return {
             "x": Mux(swap, later.step[0], earlier.step[0]),
             "y": Mux(swap, earlier.step[0], later.step[0]),
         }
+
+    def _centre(self, m: Module, places, velocity, add) -> None:
+        """Sum the first axis from the middle of the last summation to the middle of this one."""
+        a, b, c = (self.coefficients[k] for k in "abc")
+        m.d.comb += self.adders[0].change.eq(0)
+        # On a straight line neither axis waits for the other.
+        with m.If((a != 0) | (b != 0) | (c != 0)):
+            with m.If(self.fresh):
+                if self.preload == "half":
+                    m.d.comb += self.adders[0].change.eq(-(velocity >> 1))
+            with m.Elif(self.scale == places + 1):
+                m.d.comb += self.adders[0].change.eq(velocity >> 1)
+            with m.Elif(self.scale + 1 == places):
+                m.d.comb += self.adders[0].change.eq(-(velocity >> 2))
+        with m.If(self.uu.load):
+            m.d.sync += self.fresh.eq(1)
+        with m.Elif(add):
+            m.d.sync += [self.fresh.eq(0), self.scale.eq(places)]

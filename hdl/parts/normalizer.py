@@ -21,6 +21,8 @@ class Normalizer(Part):
     Built of ⌈log2 n⌉ stages; the stage of 2^k shifts by 2^k places when the top 2^k bits of every
     axis are zero.
 
+    ``places`` is s (all ones when the increments are all zero).
+
     With ``signed`` the increments are numbers with a sign, the stages look at the bits that repeat
     the sign, and the top bit in question is the one below it.
 
@@ -48,7 +50,10 @@ class Normalizer(Part):
             check_width(width)
         check_axes(axes)
         layout = per_axis(axes, Shape(width, signed))
-        super().__init__({"increments": In(layout), "normalized": Out(layout)})
+        stages = (width - 1).bit_length()
+        super().__init__(
+            {"increments": In(layout), "normalized": Out(layout), "places": Out(stages)}
+        )
         self.width = width
         self.axes = axes
         self.signed = signed
@@ -58,7 +63,7 @@ class Normalizer(Part):
         m = Module()
         letters = list(per_axis(self.axes, self.width).members)
         values = {letter: self.increments[letter] for letter in letters}
-        for k in reversed(range((self.width - 1).bit_length())):
+        for k in reversed(range(len(self.places))):
             places = 1 << k
             shape = Shape(self.width, self.signed)
             stage = {letter: Signal(shape, name=f"{letter}_{places}") for letter in letters}
@@ -71,7 +76,7 @@ class Normalizer(Part):
                 )
             else:
                 tops = (values[letter][self.width - places :] for letter in letters)
-            m.d.comb += free.eq(reduce(or_, tops) == 0)
+            m.d.comb += [free.eq(reduce(or_, tops) == 0), self.places[k].eq(free)]
             for letter in letters:
                 with m.If(free):
                     m.d.comb += stage[letter].eq(values[letter] << places)

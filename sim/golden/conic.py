@@ -63,9 +63,9 @@ class Conic:
         return {"zero": 0, "half": self.modulus // 2}[self.preload]
 
     @property
-    def halves(self) -> bool:
-        """Half of the first increment is taken off the sum that is added to first."""
-        return self.order != "simultaneous" and self.preload == "half"
+    def ordered(self) -> bool:
+        """One axis is summed after the other and with what that has moved."""
+        return self.order != "simultaneous"
 
     def registers(self) -> dict[str, tuple[int, bool]]:
         """Give the width in bits of every register and whether it is signed."""
@@ -77,8 +77,8 @@ class Conic:
         kinds |= dict.fromkeys(("xt", "yt"), (n + 1, True))
         kinds |= dict.fromkeys("abc", (n + 4, True)) | dict.fromkeys("de", (2 * n + 5, True))
         kinds |= {"turns": (TURNS_BITS, False), "backward_x": (1, False), "backward_y": (1, False)}
-        if self.halves:
-            kinds["fresh"] = (1, False)
+        if self.ordered:
+            kinds |= {"fresh": (1, False), "scale": ((self.bits - 1).bit_length(), False)}
         kinds |= {"clockwise": (1, False), "xk": (n + 1, True), "yk": (n + 1, True)}
         kinds |= {"running": (1, False), "done": (1, False), "error": (2, False)}
         kinds |= dict.fromkeys(("pulse_x", "pulse_y", "direction_x", "direction_y"), (1, False))
@@ -193,7 +193,6 @@ class Conic:
         cw = state["clockwise"]
         gx, gy = state["gx"], state["gy"]
         last, entering = equal(state["turns"], 0), equal(state["turns"], 1)
-        fresh = state["fresh"] if self.halves else 0
 
         # x' = −Gy, y' = Gx, or with the clock the other way.
         below = {
@@ -208,15 +207,13 @@ class Conic:
         dead = negate(able["x"] | able["y"])
         # The gradient turns one way: of two axes one speeds up, the other will turn round.
         x_speeds_up = piece["x"] ^ piece["y"] ^ cw
-        whole = clock & negate(fresh)
-        turn = whole & negate(last) & (dead | negate(where(x_speeds_up, goes["y"], goes["x"])))
-        sums = whole & negate(turn)
-        halving = clock & fresh
+        turn = clock & negate(last) & (dead | negate(where(x_speeds_up, goes["y"], goes["x"])))
+        sums = clock & negate(turn)
 
         after = dict(state)
-        hit = self._sum(state, after, able, piece, x_speeds_up, sums, halving, tell)
-        if self.halves:
-            after["fresh"] = where(load, 1, where(clock, 0, fresh))
+        hit = self._sum(state, after, able, piece, x_speeds_up, sums, tell)
+        if self.ordered:
+            after["fresh"] = where(load, 1, after["fresh"])
         complete = sums & last & dead
         step, move = {}, {}
         for k, p, count in (("x", "p1", "p3"), ("y", "p2", "p4")):
@@ -259,7 +256,8 @@ class Conic:
 
         # The end, by a step or, when the last change of direction finds it reached, without one.
         stepless = turn & entering & here["x"] & here["y"]
-        arrived = sums & (last | entering) & lands["x"] & lands["y"]
+        steps = step["x"] | step["y"]
+        arrived = sums & steps & (last | entering) & lands["x"] & lands["y"]
         return after | {"finished": arrived | stepless, "stepless": stepless}
 
     def _sum(
@@ -270,7 +268,6 @@ class Conic:
         piece: State,
         x_speeds_up: Value,
         sums: Value,
-        halving: Value,
         tell: Callable,
     ) -> State:
         """Sum both axes, the one that speeds up first; give which of them step."""
@@ -278,7 +275,8 @@ class Conic:
         a, b, c = (state[k] for k in "abc")
         # An axis that does not go must not hold the other one up.
         going = [where(able["y"], state["gx"], 0), where(able["x"], state["gy"], 0)]
-        scaled = self._scaled([*going, 2 * a, b, 2 * c])
+        scaled, places = self._scaled([*going, 2 * a, b, 2 * c])
+        places = tell("places", places)
         names = ("gx", "gy", "2a", "b", "2c")
         gx, gy, a2, b1, c2 = (tell(f"scaled_{k}", v) for k, v in zip(names, scaled, strict=True))
         velocity = {"x": where(cw, gy, 0 - gy), "y": where(cw, 0 - gx, gx)}
@@ -287,9 +285,12 @@ class Conic:
 
         change: Value = 0
         own: Value = 0
-        speeds, hits, rests, cans = [], [], [], []
+        hits, rests, cans = [], [], []
         for which, x_now in (("first", x_first), ("second", negate(x_first))):
             speed = tell(f"{which}_velocity", where(x_now, velocity["x"], velocity["y"]))
+            if which == "first" and self.ordered:
+                change = self._centred(state, speed, places)
+            change = tell(f"{which}_change", change)
             total = tell(f"{which}_total", where(x_now, state["sx"], state["sy"]) + speed + change)
             down = where(x_now, piece["x"], piece["y"])
             can = sums & where(x_now, able["x"], able["y"])
@@ -302,17 +303,18 @@ class Conic:
             rest = tell(f"{which}_unlimited", rest)
             rest = where(less(rest, 2 * m), rest, 2 * m - 1)
             rest = tell(f"{which}_rest", where(less(rest, -2 * m), -2 * m, rest))
-            if which == "first" and self.order != "simultaneous":
+            change = 0
+            if which == "first" and self.ordered:
                 # What the first axis's step changes in y' = Gx, or in x' = −Gy.
                 cross = _times(step, where(x_first, a2, c2))
                 change = where(opposite, 0 - cross, cross)
-            speeds.append(speed)
             rests.append(rest)
             hits.append(step & 1)
             cans.append(can)
 
-        wide = self.bits + self.guard + 1
-        bent = negate(equal(a, 0) & equal(b, 0) & equal(c, 0))
+        if self.ordered:
+            after["fresh"] = where(sums, 0, state["fresh"])
+            after["scale"] = where(sums, places, state["scale"])
         hit = {}
         for k, now in (("x", x_first), ("y", negate(x_first))):
             first, second = (
@@ -320,13 +322,25 @@ class Conic:
             )
             after[f"s{k}"] = where(now, first, second)
             hit[k] = where(now, *hits)
-            if self.halves:
-                half = self._signed(state[f"s{k}"] - (speeds[0] >> 1), wide)
-                after[f"s{k}"] = where(halving & bent & now, half, after[f"s{k}"])
         return hit
 
-    def _scaled(self, values: list[Value]) -> list[Value]:
-        """Shift numbers left together until one of them would lose its sign."""
+    def _centred(self, state: State, speed: Value, places: Value) -> Value:
+        """Give what is added to the first axis's speed, half a summation before the second's.
+
+        So it is summed from the middle of the last summation to the middle of this one, and adds
+        the mean of both scales: half of this one at first, 3/2 of it when the last one was twice
+        as large, 3/4 when it was half. Neither axis of a straight line waits for the other.
+        """
+        bent = negate(equal(state["a"], 0) & equal(state["b"], 0) & equal(state["c"], 0))
+        at_first = 0 - (speed >> 1) if self.preload == "half" else 0
+        longer = equal(state["scale"], places + 1)
+        shorter = equal(state["scale"] + 1, places)
+        later = where(longer, speed >> 1, where(shorter, 0 - (speed >> 2), 0))
+        return where(bent, where(state["fresh"], at_first, later), 0)
+
+    def _scaled(self, values: list[Value]) -> tuple[list[Value], Value]:
+        """Shift numbers left together until one would lose its sign; give also how many places."""
+        total: Value = 0
         places = 1
         while 2 * places < self.bits:
             places *= 2
@@ -336,8 +350,9 @@ class Conic:
             for value in values:
                 small = small & negate(less(value, -edge)) & less(value, edge)
             values = [where(small, value << places, value) for value in values]
+            total = total + where(small, places, 0)
             places //= 2
-        return values
+        return values, total
 
     def _signed(self, value: Value, bits: int) -> Value:
         """Keep a number to its signed bits."""
