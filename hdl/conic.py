@@ -86,9 +86,10 @@ class Conic(Part):
 
     Scale: before every summation Gx, Gy and with them 2A, B, 2C are shifted left together until one
     has its top bit set. A derivative of which the axis does not go counts as 0 there. When s has
-    changed by 1 since the last summation, the axis that is added to first (but for order
-    simultaneous and straight lines) adds the mean of both scales: 3/2 or 3/4 of its increment, so
-    that it stays half a summation before the other one.
+    changed by 1 since the last summation, the axis that is added to first (but not in order
+    simultaneous) adds the mean of both scales, 3/2 or 3/4 of its increment, so that it stays half a
+    summation before the other one. Lines need no such thing, and on circles, where s goes to and
+    fro, what is left out comes back; there the points are those of the circular interpolator.
 
     Registers: P1, P2 = x, y; GX, GY; SX, SY; P3, P4 = steps left of x and y in this piece (in the
     last one those to the end, before it those to the edge of the coordinates); A…E; XT, YT =
@@ -502,16 +503,16 @@ class Conic(Part):
     def _centre(self, m: Module, places, velocity, add) -> None:
         """Sum the first axis from the middle of the last summation to the middle of this one."""
         a, b, c = (self.coefficients[k] for k in "abc")
-        m.d.comb += self.adders[0].change.eq(0)
-        # On a straight line neither axis waits for the other.
-        with m.If((a != 0) | (b != 0) | (c != 0)):
-            with m.If(self.fresh):
-                if self.preload == "half":
-                    m.d.comb += self.adders[0].change.eq(-(velocity >> 1))
-            with m.Elif(self.scale == places + 1):
-                m.d.comb += self.adders[0].change.eq(velocity >> 1)
-            with m.Elif(self.scale + 1 == places):
-                m.d.comb += self.adders[0].change.eq(-(velocity >> 2))
+        circle, line = Signal(), Signal()
+        m.d.comb += [circle.eq((b == 0) & (a == c)), line.eq(circle & (a == 0))]
+        change = self.adders[0].change
+        with m.If(self.fresh):
+            if self.preload == "half":
+                m.d.comb += change.eq(Mux(line, 0, -(velocity >> 1)))
+        with m.Elif(~circle & (self.scale == places + 1)):
+            m.d.comb += change.eq(velocity >> 1)
+        with m.Elif(~circle & (self.scale + 1 == places)):
+            m.d.comb += change.eq(-(velocity >> 2))
         with m.If(self.uu.load):
             m.d.sync += self.fresh.eq(1)
         with m.Elif(add):

@@ -329,14 +329,16 @@ class Conic:
 
         So it is summed from the middle of the last summation to the middle of this one, and adds
         the mean of both scales: half of this one at first, 3/2 of it when the last one was twice
-        as large, 3/4 when it was half. Neither axis of a straight line waits for the other.
+        as large, 3/4 when it was half. Neither axis of a straight line waits for the other; and on
+        circles only the first increment is halved.
         """
-        bent = negate(equal(state["a"], 0) & equal(state["b"], 0) & equal(state["c"], 0))
-        at_first = 0 - (speed >> 1) if self.preload == "half" else 0
+        circle = equal(state["b"], 0) & equal(state["a"], state["c"])
+        line = circle & equal(state["a"], 0)
+        at_first = where(line, 0, 0 - (speed >> 1)) if self.preload == "half" else 0
         longer = equal(state["scale"], places + 1)
         shorter = equal(state["scale"] + 1, places)
         later = where(longer, speed >> 1, where(shorter, 0 - (speed >> 2), 0))
-        return where(bent, where(state["fresh"], at_first, later), 0)
+        return where(state["fresh"], at_first, where(circle, 0, later))
 
     def _scaled(self, values: list[Value]) -> tuple[list[Value], Value]:
         """Shift numbers left together until one would lose its sign; give also how many places."""
