@@ -104,7 +104,8 @@ class Conic(Part):
     once and no step was ``last``.)
 
     Latency: a block accepted in clock 0 is prepared from clock 1 to n + 3, started in clock n + 4
-    and summed from the clock after. A carry is a step in the next clock. ``done`` follows the last step by a clock.
+    and summed from the clock after. A carry is a step in the next clock. ``done`` follows the last
+    step by a clock.
 
     Throughput: one summation a clock, and one clock for every change of direction. Blocks are
     accepted when nothing runs or waits: n + 5 clocks lie between the last step of one and the first
