@@ -18,6 +18,7 @@ from schemdraw.logic import TimingDiagram
 from schemdraw.segments import Segment, SegmentCircle, SegmentPoly, SegmentText
 
 from discreta.hdl.circular import Circular
+from discreta.hdl.conic import Conic
 from discreta.hdl.contract import Part
 from discreta.hdl.linear import Linear
 from discreta.sim.interpreted import CLOCK_PERIOD
@@ -30,6 +31,8 @@ __all__ = [
     "Timing",
     "circular_blocks",
     "circular_turn",
+    "conic_blocks",
+    "conic_turn",
     "draw",
     "linear_blocks",
     "linear_carry",
@@ -129,7 +132,14 @@ class Sheet(Element):
             self.words((0.1, y + 0.22), what)
 
     def summator(
-        self, axis: str, counter: str, left: float, y: float, outer: float, edge: float
+        self,
+        axis: str,
+        counter: str,
+        left: float,
+        y: float,
+        outer: float,
+        edge: float,
+        carry: str = "carry",
     ) -> None:
         """Draw the summator of an axis, its counter ``outer`` of it, its carry to the output."""
         side = 1 if outer > y else -1
@@ -147,7 +157,7 @@ class Sheet(Element):
         )
         # The carry is a step, and one less to go; none to go stops the summator.
         self.wire((left + 1.5, y), (edge, y))
-        self.words((left + 1.6, y - 0.25 * side), "carry")
+        self.words((left + 1.6, y - 0.25 * side), carry)
         self.dot((left + 2.65, y))
         self.wire((left + 2.65, y), (left + 2.65, outer - 0.6 * side))
         self.words((left + 2.75, outer - 0.95 * side), "−1")
@@ -377,6 +387,127 @@ def circular_blocks() -> Iterable[Element]:
     return [s]
 
 
+def conic_blocks() -> Iterable[Element]:
+    """Draw the block diagram of the interpolator of second-order curves, after the lecture's."""
+    s = Sheet(-0.1, -4.6, 22.6, 11.2)
+    s.box(
+        *(5.6, 4.95, 8.0, 7.6),
+        fill=REGISTER_FILL,
+        name="GX",
+        words="scale converter\n2A·x + B·y + D\n\na step: ±2A, ±B",
+    )
+    s.box(
+        *(5.6, 1.8, 8.0, 4.45),
+        fill=REGISTER_FILL,
+        name="GY",
+        words="scale converter\nB·x + 2C·y + E\n\na step: ±B, ±2C",
+    )
+    s.box(
+        *(8.5, 2.2, 10.4, 7.2),
+        fill=LOGIC_FILL,
+        name="Normalizer",
+        words="× 2ˢ,\nthe same s\nfor GX, GY,\n2A, B, 2C,\nevery clock",
+    )
+    s.box(
+        *(16.8, 0.1, 18.9, 9.3),
+        fill=LOGIC_FILL,
+        name="Output",
+        words="processing\n\nputs in the\nsigns; holds\na step until\nit is taken",
+    )
+    s.box(3.0, 8.5, 4.6, 10.1, fill=REGISTER_FILL, name="A … E", words="coefficients")
+    rows = (("X", "1", 6.4, 8.7, 1), ("Y", "2", 3.0, 0.7, -1))
+    for axis, number, y, outer, side in rows:
+        s.box(
+            3.0, y - 0.6, 4.6, y + 0.6, fill=REGISTER_FILL, name=f"P{number}", words=f"{axis} now"
+        )
+        counter = f"P{int(number) + 2}"
+        s.summator(axis, counter, 12.6, y, outer, 16.8, "carry, borrow")
+        s.wire((4.6, y), (5.6, y))
+        # The steps count the coordinate and move both derivatives.
+        back = y + 1.53 * side
+        s.dot((15.25, back))
+        s.wire((15.25, back), (3.8, back), (3.8, y + 0.6 * side))
+        s.words((3.9, y + 0.95 * side), "±1")
+        s.dot((6.8, back))
+        s.wire((6.8, back), (6.8, y + 1.2 * side))
+        s.words((8.3, back + 0.22 * side), "each step goes to both")
+        s.load((3.3, y - 0.6 * side), -side)
+        s.load((12.9, y - 0.6 * side), -side, "clock, load")
+    # Each point goes to both converters, bit by bit, while the block is prepared.
+    for y, other in ((6.4, 3.8), (3.0, 5.6)):
+        s.dot((5.1, y))
+        s.wire((5.1, y), (5.1, other), (5.6, other))
+    s.wire((4.6, 9.7), (7.6, 9.7), (7.6, 7.6))
+    s.words((4.7, 9.92), "P, Q, R of both converters")
+
+    # Each derivative moves the other axis.
+    s.wire((8.0, 6.4), (8.5, 6.4), color=EYE, weight=3)
+    s.wire((8.0, 3.0), (8.5, 3.0), color=EYE, weight=3)
+    falling = ((10.4, 6.4), (10.7, 6.4), (12.0, 3.0), (12.6, 3.0))
+    rising = ((10.4, 3.0), (10.7, 3.0), (12.0, 6.4), (12.6, 6.4))
+    s.wire(*falling, color=EYE, weight=3)
+    s.gap((11.2, 4.31), (11.5, 5.09), weight=8)
+    s.wire(*rising, color=EYE, weight=3)
+    s.words((12.5, 6.75), "−GY · 2ˢ", "right", EYE)
+    s.words((12.5, 2.65), "GX · 2ˢ", "right", EYE)
+    s.words((14.3, 4.92), "x′ = −k·GY,  y′ = k·GX", "center", EYE, NAME_SIZE)
+    s.words((14.3, 4.48), "the axis that speeds up first", "center", QUIET)
+
+    # In and out: the block, the steps, the coordinates.
+    s.box(2.1, 2.4, 2.4, 10.9, fill=LOGIC_FILL, name="")
+    s.block(2.1, 9.7, "A, B, C, D, E", "start XH, YH", "end XK, YK", "clockwise", "turns")
+    for y in (9.7, 6.4, 3.0):
+        s.wire((2.4, y), (3.0, y))
+    s.position((2.4, 10.5), 18.9, (("XT", ""), ("YT", "")), 7.2)
+    s.wire((18.9, 2.6), (20.0, 2.6))
+    s.words((20.1, 2.6), "steps: x, y, valid")
+
+    # The control unit, and what it does at a change of direction.
+    s.box(
+        *(3.0, -4.3, 18.9, -0.9),
+        fill=CONTROL_FILL,
+        name="УУ",
+        words="control unit\n\nprepares a block in\nn + 4 clocks, in the\nregisters it runs in",
+        middle=5.3,
+    )
+    s.box(
+        *(7.7, -2.5, 10.6, -1.2),
+        fill=REGISTER_FILL,
+        name="turns",
+        words="changes of direction\nto come",
+    )
+    s.box(7.7, -4.0, 10.6, -2.7, fill=REGISTER_FILL, name="XK, YK", words="the end")
+    s.box(10.9, -4.1, 18.6, -1.1, fill=PAPER, name="")
+    s.words((14.75, -1.38), "turn", "center", size=NAME_SIZE)
+    s.words((14.75, -1.76), "of the slower axis, when it stands still and turns > 0", "center")
+    for row, words in enumerate(
+        (
+            "its direction ← ~direction, turns ← turns − 1",
+            "P3, P4 ← room to the edge of the coordinates,",
+            "at last |XK − P1|, |YK − P2|",
+        )
+    ):
+        s.words((11.2, -2.45 - 0.5 * row), words)
+    s.load((14.9, 9.3), 1, "load, turn")
+    s.load((14.8, 0.1), -1, "load, turn", "right")
+    s.load((17.1, 9.3), 1, "load, turn")
+    s.wire((2.25, 2.4), (2.25, -2.6), (3.0, -2.6))
+    s.words((2.35, 0.0), "XK, YK, clockwise, turns")
+    s.signal(
+        (15.9, 8.7),
+        (16.35, 8.7),
+        (16.35, -0.9),
+        words="0, ending",
+        at=(15.45, -0.68),
+        align="right",
+    )
+    s.signal((15.6, 0.1), (15.6, -0.9))
+    s.signal((17.1, 0.1), (17.1, -0.9), words="waiting", at=(17.2, -0.4))
+    s.signal((18.6, -0.9), (18.6, 0.1), words="clock, taken", at=(18.7, -0.4))
+    s.answers(18.9, -1.3)
+    return [s]
+
+
 def with_minus(value: object) -> str:
     """Write numbers with a minus sign, not a hyphen."""
     return str(value).replace("-", "−")
@@ -599,10 +730,60 @@ def circular_turn() -> Timing:
     )
 
 
+def conic_turn() -> Timing:
+    """Show a parabola about its vertex: the clock in which x turns round."""
+    width, start, end = 4, (2, 4), (2, -4)
+    core = Conic(width, **Conic.LECTURE)
+    registers = core.registers
+    step = core.steps.payload
+
+    def turn(run: Run) -> int:
+        return clocks[run["turns"].index(0) - 1]
+
+    def arrows(run: Run) -> list[tuple[Spot, Spot]]:
+        before, after = turn(run) + 0.68, turn(run) + 1.28
+        return [(("GY", before), (name, after)) for name in ("x falls", "P3", "P4")]
+
+    clocks = range(9, 22)
+    return Timing(
+        core,
+        {
+            **{"a": 0, "b": 0, "c": 1, "d": -8, "e": 0, "clockwise": 0, "turns": 1},
+            "start": dict(zip("xy", start, strict=True)),
+            "end": dict(zip("xy", end, strict=True)),
+        },
+        {
+            "УУ clock": Lane(core.uu.clock, "a summation in this clock, or the turn"),
+            "turns": Lane(registers["turns"], "changes of direction to come", number=True),
+            "x falls": Lane(registers["direction_x"], "which way x goes"),
+            "P1 = X": Lane(registers["p1"], "coordinate, a step ahead", number=True),
+            "P2 = Y": Lane(registers["p2"], "coordinate, a step ahead", number=True),
+            "P3": Lane(registers["p3"], "steps of x to the edge, then to the end", number=True),
+            "P4": Lane(registers["p4"], "steps of y to the edge, then to the end", number=True),
+            "GX": Lane(registers["gx"], "2A·x + B·y + D = −8: how fast y goes", number=True),
+            "GY": Lane(registers["gy"], "B·x + 2C·y + E = 2y: how fast x goes back", number=True),
+            "SX": Lane(registers["sx"], "sum of −GY · 2ˢ; a borrow is a step back", number=True),
+            "SY": Lane(registers["sy"], "sum of GX · 2ˢ", number=True),
+            "steps.valid": Lane(core.steps.valid, "a step waits, and is taken"),
+            "steps.x": Lane(step.x, "the step along x", number=True),
+            "steps.y": Lane(step.y, "the step along y", number=True),
+            "done = край": Lane(core.done, "end of the block"),
+        },
+        clocks,
+        turn,
+        "turn",
+        arrows,
+        f"block y² = 8x, {start} → {with_minus(end)}, n = {width}, the lecture’s settings",
+        arrow="->",
+        arrow_color=EYE,
+    )
+
+
 #: The timing diagrams, by the names of their files.
 TIMINGS: dict[str, Callable[[], Timing]] = {
     "linear-carry": linear_carry,
     "circular-turn": circular_turn,
+    "conic-turn": conic_turn,
 }
 
 #: The pictures, by the names of their files.
@@ -611,6 +792,8 @@ FIGURES: dict[str, Callable[[], Iterable[Element]]] = {
     "linear-carry": lambda: linear_carry().draw(),
     "circular-blocks": circular_blocks,
     "circular-turn": lambda: circular_turn().draw(),
+    "conic-blocks": conic_blocks,
+    "conic-turn": lambda: conic_turn().draw(),
 }
 
 

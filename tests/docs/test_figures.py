@@ -64,6 +64,11 @@ def turn() -> Drawn:
 
 
 @pytest.fixture(scope="module")
+def change() -> Drawn:
+    return Drawn(figures.conic_turn())
+
+
+@pytest.fixture(scope="module")
 def summations(carry) -> list[int]:
     """How many summations of the line there were before every clock."""
     return [0, *accumulate(carry["УУ clock"].values())][:-1]
@@ -89,7 +94,7 @@ def test_only_pictures_there_are_can_be_asked_for():
     assert "no-such-picture" in result.output
 
 
-@pytest.mark.parametrize("name", ["carry", "turn"])
+@pytest.mark.parametrize("name", ["carry", "turn", "change"])
 def test_lanes_ticks_and_arrows_are_where_the_clocks_are(name, request):
     drawn: Drawn = request.getfixturevalue(name)
     clocks = drawn.clocks
@@ -211,3 +216,66 @@ def test_steps_and_position_are_the_arc_seen_by_the_machine(turn):
         if clock + 1 in turn.clocks:
             assert (turn["XT"][clock + 1], turn["YT"][clock + 1]) == reached
     assert (turn["XT"][turn.clocks[-1]], turn["YT"][turn.clocks[-1]]) == (-XH, YH)
+
+
+def by_the_parabola() -> Iterator[dict[str, int]]:
+    """Work y² = 8x out by the lecture's rule: what the registers are in every clock summed in.
+
+    From (2, 4) to (2, −4), so that y falls all the time, and x falls and then rises.
+    """
+    modulus, edge = 1 << (2 * WIDTH + 6), 1 << WIDTH
+    x, y, sx, sy, turns = 2, 4, modulus - 1, modulus - 1, 1
+    left_x, left_y = x + edge, y + edge
+    for _ in range(100):
+        gx, gy = -8, 2 * y
+        yield {
+            **{"turns": turns, "x falls": turns, "P1 = X": x, "P2 = Y": y, "GX": gx, "GY": gy},
+            **{"P3": left_x, "P4": left_y, "SX": sx, "SY": sy},
+        }
+        x_goes = left_x and (gy > 0 if turns else gy < 0)
+        if turns and not x_goes:
+            turns, left_x, left_y = 0, abs(2 - x), abs(-4 - y)
+            continue
+        if not (left_x or left_y):
+            return
+        step_x = step_y = 0
+        if not x_goes and not left_y:
+            step_x = 1
+        else:
+            scale = 1
+            while all(-modulus <= 2 * scale * g < modulus for g in (gx * (left_y > 0), gy, 2)):
+                scale *= 2
+            if x_goes:
+                sx -= gy * scale
+                step_x = (sx >= modulus) - (sx < 0)
+                sx -= step_x * modulus
+            if left_y:
+                sy += gx * scale
+                step_y = -(sy < 0)
+                sy -= step_y * modulus
+        x, y = x + step_x, y + step_y
+        left_x, left_y = left_x - abs(step_x), left_y - abs(step_y)
+
+
+def test_registers_of_the_parabola_are_the_rule(change):
+    # Prepared in n + 4 clocks, started in clock n + 4, summed from the next one on.
+    rule = dict(enumerate(by_the_parabola(), WIDTH + 5))
+    last = max(rule)
+    assert change.clocks[0] in rule
+    assert last in change.clocks
+    for clock in change.clocks:
+        for name, value in rule[min(clock, last)].items():
+            assert change[name][clock] == value, (clock, name)
+        assert change["УУ clock"][clock] == (clock < last)
+        assert change["done = край"][clock] == (clock > last)
+
+
+def test_x_turns_round_in_one_clock_at_the_vertex(change):
+    before = int(change.wave["shade"][0].split()[0]) + change.clocks[0]
+    after = before + 1
+    assert [c for c in change.clocks[1:] if change["turns"][c] != change["turns"][c - 1]] == [after]
+    assert change["GY"][before] == change["P1 = X"][before] == change["P2 = Y"][before] == 0
+    assert change["steps.valid"][after] == 0  # a turn moves nothing
+    assert {step for c, step in change["steps.x"].items() if c <= before} == {0, -1}
+    assert {step for c, step in change["steps.x"].items() if c > before} == {0, 1}
+    assert change.arrows == {("GY", name): (before, after) for name in ("x falls", "P3", "P4")}
