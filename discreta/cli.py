@@ -1,6 +1,7 @@
 """The command line: ``discreta``."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -8,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from fractions import Fraction
 from importlib import metadata
 from io import TextIOWrapper
 from typing import Any, NoReturn, cast
@@ -17,7 +19,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from discreta.hdl.circular import ORDERS
+from discreta.hdl.conic import MAX_WIDTH as CONIC_MAX_WIDTH
+from discreta.hdl.conic import ORDERS
 from discreta.hdl.contract import (
     MAX_AXES,
     MAX_GUARD,
@@ -31,7 +34,8 @@ from discreta.hdl.contract import (
 from discreta.hdl.parts import PRELOADS
 from discreta.hdl.verilog import verilog as emit_verilog
 from discreta.sim.compiled import compiler
-from discreta.sim.curves import Arc, Curve, Polyline
+from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
+from discreta.sim.curves import Arc, Conic, Curve, Polyline
 from discreta.sim.methods import METHODS, Method
 from discreta.sim.outputs import Outputs
 from discreta.sim.points import (
@@ -68,6 +72,31 @@ class _Point(click.ParamType):
                 ctx,
             )
         return point
+
+
+class _Numbers(click.ParamType):
+    """Numbers: whole ones, decimals or fractions."""
+
+    #: Of no more digits than any device can tell apart.
+    _FORM = re.compile(
+        r"\s*[+-]?(\d{1,40}(\.\d{0,40})?(e[+-]?\d{1,2})?|\d{1,40}/0*[1-9]\d{0,40})\s*", re.ASCII
+    )
+
+    def __init__(self, name: str, like: str):
+        self.name = name
+        self._like = like
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[Fraction, ...]:
+        cells = value.split(",")
+        count = self._like.count(",") + 1
+        if len(cells) != count or not all(map(self._FORM.fullmatch, cells)):
+            self.fail(
+                f"{value!r} is not {self.name}: give {count} numbers with commas between, like "
+                f"{self._like}",
+                param,
+                ctx,
+            )
+        return tuple(Fraction(cell) for cell in cells)
 
 
 class _MethodName(click.ParamType):
@@ -112,14 +141,20 @@ def _options(*options: Callable) -> Callable:
     return decorate
 
 
-def _width_option(default: int) -> Callable:
+def _width_option(default: int, most: int = MAX_WIDTH) -> Callable:
     return click.option(
         "--width",
-        type=_Number("width", MIN_WIDTH, MAX_WIDTH, check_width),
+        type=_Number("width", MIN_WIDTH, most, lambda width: check_width(width, most)),
         default=default,
         show_default=True,
-        help="Bits of the device, 4 to 32: lines and radii are up to 2^N - 1 steps long, "
-        "coordinates lie between -2^N and 2^N - 1.",
+        help=f"Bits of the device, {MIN_WIDTH} to {most}: "
+        + (
+            f"lines and radii are up to 2^N - 1 steps long (conics: {MIN_WIDTH} to "
+            f"{CONIC_MAX_WIDTH}), "
+            if most == MAX_WIDTH
+            else ""
+        )
+        + "coordinates lie between -2^N and 2^N - 1.",
     )
 
 
@@ -127,15 +162,19 @@ _width = _width_option(16)
 
 
 def _defaults(choice: str) -> str:
-    """Say what a choice is by default, in every setting, as the methods that have it agree."""
+    """Say what a choice is by default, in every setting; of which method, where they differ."""
     words = []
     for setting in ("default", "lecture"):
-        values = [
-            method.settings[setting][choice]
+        said = {
+            method.name: say_choices({choice: method.settings[setting][choice]})
             for method in METHODS.values()
             if choice in method.settings[setting]
-        ]
-        words.append(say_choices({choice: values[0]}).removeprefix(f"{choice} "))
+        }
+        said = {name: value.removeprefix(f"{choice} ") for name, value in said.items()}
+        if len(set(said.values())) == 1:
+            words.append(next(iter(said.values())))
+        else:
+            words.append(", ".join(f"{value} ({name})" for name, value in said.items()))
     return f"[default: {words[0]}; lecture: {words[1]}]"
 
 
@@ -156,27 +195,29 @@ _setting_options = _options(
     click.option(
         "--normalize/--no-normalize",
         default=None,
-        help="Shift what is summed left first, as far as it goes: fewer clocks. "
+        help="Lines and arcs: shift what is summed left first, as far as it goes: fewer clocks. "
         f"{_defaults('normalize')}",
     ),
     click.option(
         "--order",
         type=click.Choice(ORDERS),
-        help="Arcs: SY adds the X that SX has just moved, or that from before the clock. "
+        help="Arcs and conics: the axis that is summed second takes account of the step of the "
+        "first one (alternated), on conics of its own step too (implicit), or both of neither "
+        "(simultaneous). "
         f"{_defaults('order')}",
     ),
     click.option(
         "--guard",
         type=_Number("number of guard bits", 0, MAX_GUARD, check_guard),
-        help="Arcs: bits more in the summators, 0 to 4: each halves the increments, for less "
-        f"error in twice the clocks. {_defaults('guard')}",
+        help="Arcs and conics: bits more in the summators, 0 to 4: each halves the increments, for "
+        f"less error in twice the clocks. {_defaults('guard')}",
     ),
 )
 #: What these give besides the setting.
 _CHOICES = ("preload", "normalize", "order", "guard")
 
 
-def _run_options(method: str) -> Callable:
+def _run_options(method: str, width: Callable = _width) -> Callable:
     return _options(
         click.option(
             "--method",
@@ -185,7 +226,7 @@ def _run_options(method: str) -> Callable:
             show_default=True,
             help="See `discreta methods`.",
         ),
-        _width,
+        width,
         _setting_options,
         click.option(
             "--engine",
@@ -207,7 +248,7 @@ def _chosen(method: Method, setting: str, given: dict[str, Any]) -> dict[str, An
     Raises
     ------
     BadInputError
-        The method has no such setting or choice.
+        The method has no such setting or choice, or none of this value.
     """
     if setting not in method.settings:
         raise BadInputError(
@@ -220,9 +261,22 @@ def _chosen(method: Method, setting: str, given: dict[str, Any]) -> dict[str, An
                 f"--{name} is no option of {method.name}, which has "
                 f"{' and '.join(f'--{choice}' for choice in choices)}: leave it out"
             )
+        if isinstance(value, str) and value not in method.choices[name]:
+            raise BadInputError(
+                f"--{name} {value}: choose {' or '.join(method.choices[name])} for {method.name}"
+            )
         if value is not None:
             choices[name] = value
     return choices
+
+
+def _check_width(method: Method, width: int) -> None:
+    """Raise :class:`BadInputError` for a width that a method's devices do not have."""
+    if width > method.max_width:
+        raise BadInputError(
+            f"--width {width}: {method.name} has up to {method.max_width} bits: choose "
+            f"{MIN_WIDTH} to {method.max_width}"
+        )
 
 
 _one_setting = click.option(
@@ -350,6 +404,111 @@ def simulate_arc(
     _simulate(Arc(start, end, center, clockwise=direction == "cw", turns=turns), **options)
 
 
+@simulate_group.command("conic")
+@click.option(
+    "--coefficients",
+    type=_Numbers("A,B,C,D,E", "1,0,1,0,0"),
+    help="A curve Ax^2 + Bxy + Cy^2 + Dx + Ey + F = 0; F follows from the start.",
+)
+@click.option(
+    "--ellipse",
+    "shape",
+    type=_Numbers("X,Y,R1,R2,DEGREES", "0,0,300,120,30"),
+    help="An ellipse by its center, its semi-axes, and the angle of the first one to the x axis.",
+)
+@click.option(
+    "--parabola",
+    "control",
+    type=_Point(2),
+    help="A parabola: the point where its tangents at start and end meet.",
+)
+@click.option("--start", type=_Point(2), help="Where the curve begins, in steps.")
+@click.option("--end", type=_Point(2), help="Where it ends, on the curve or up to a step off it.")
+@click.option(
+    "--direction",
+    type=click.Choice(["ccw", "cw"]),
+    help="With the bend to the left (ccw) or to the right (cw), as seen with x to the right and y "
+    "upwards. A straight line goes to its end in any case.",
+)
+@click.option(
+    "--angles",
+    type=_Numbers("FROM,TO", "0,90"),
+    help="Where an ellipse begins and ends: in degrees, 0 at the end of the first semi-axis and 90 "
+    "at that of the second. [default: 0,360]",
+)
+@click.option(
+    "--turns",
+    type=_Number("number of turns", 1, MAX_TURNS, check_turns),
+    help=f"The turn of an ellipse or circle in which it ends, up to {MAX_TURNS}. [default: 1]",
+)
+@_run_options("conic", _width_option(16, CONIC_MAX_WIDTH))
+def simulate_conic(width: int, **options: Any) -> None:
+    """Run one piece of an ellipse, circle, parabola, hyperbola or line.
+
+    The curve is given by --coefficients with --start, --end and --direction, by --ellipse with
+    --direction, or by --parabola with --start and --end, which say its direction. Numbers may be
+    whole, decimals or fractions. In the summary, curve moved is how far it had to be moved for the
+    device's coefficients, in steps. Exits 1 when the end is not reached.
+
+    \b
+    Example: discreta simulate conic --ellipse 0,0,300,120,30 \\
+                 --direction ccw --plot ellipse.svg
+    """
+    given = {name: options.pop(name) for name in _CONIC_OPTIONS}
+    _simulate(Conic(_conic_block(given, width)), width=width, **options)
+
+
+#: What gives a conic: what goes with each, and what must.
+_CONICS = {
+    "coefficients": (("start", "end", "direction", "turns"), ("start", "end", "direction")),
+    "shape": (("direction", "angles", "turns"), ("direction",)),
+    "control": (("start", "end"), ("start", "end")),
+}
+_CONIC_OPTIONS = (*_CONICS, "start", "end", "direction", "angles", "turns")
+
+
+def _conic_block(given: dict[str, Any], width: int) -> ConicBlock:
+    """Make the block of a conic from the options, of which those that are not given are None."""
+    named = {"shape": "--ellipse", "control": "--parabola"}
+    words = {name: named.get(name, f"--{name}") for name in given}
+    chosen = [name for name in _CONICS if given[name] is not None]
+    if len(chosen) != 1:
+        raise BadInputError(
+            f"{' and '.join(words[name] for name in chosen) or 'no curve'} given: choose one of "
+            f"{', '.join(words[name] for name in _CONICS)}"
+        )
+    (way,) = chosen
+    fitting, needed = _CONICS[way]
+    for name, value in given.items():
+        if value is not None and name not in (way, *fitting):
+            raise BadInputError(f"{words[name]} does not go with {words[way]}: leave it out")
+        if value is None and name in needed:
+            raise BadInputError(f"{words[way]} needs {words[name]} too: give it")
+    clockwise, full_turns = given["direction"] == "cw", (given["turns"] or 1) - 1
+    start, end = given["start"], given["end"]
+    if way == "coefficients":
+        return from_coefficients(given[way], start, end, clockwise, width, full_turns)
+    if way == "control":
+        return parabola(start, given[way], end, width)
+    x, y, r1, r2, turned = given[way]
+    if x.denominator * y.denominator != 1:
+        raise BadInputError(
+            f"the center {float(x):g},{float(y):g} of --ellipse is between the steps: give whole "
+            "numbers"
+        )
+    first, last = given["angles"] or (0, 0)
+    return ellipse(
+        (int(x), int(y)),
+        (r1, r2),
+        turned,
+        width,
+        start_angle=first,
+        end_angle=last,
+        clockwise=clockwise,
+        full_turns=full_turns,
+    )
+
+
 def _simulate(curve: Curve, *, method: Method, setting: str, **options: Any) -> None:
     choices = _chosen(method, setting, {name: options.pop(name) for name in _CHOICES})
     trace, vcd = options["trace"], options["vcd"]
@@ -412,7 +571,7 @@ def _out() -> Console:
     type=_Number("number of axes", MIN_AXES, MAX_AXES, check_axes),
     default=2,
     show_default=True,
-    help="2 to 6 for lines, 2 for arcs.",
+    help="2 to 6 for lines, 2 for arcs and conics.",
 )
 @_setting_options
 @click.option("--output", metavar="FILE.v", default="-", help="[default: standard output]")
@@ -423,6 +582,7 @@ def verilog(method: Method, width: int, axes: int, setting: str, output: str, **
     """
     if axes not in method.axes:
         raise BadInputError(f"--axes {axes}: {method.name} has {method.axes[0]} axes: leave it out")
+    _check_width(method, width)
     choices = _chosen(method, setting, given)
     with Outputs() as outputs:
         file = outputs.open(output)
@@ -449,6 +609,8 @@ def prove(methods: tuple[Method, ...], width: int, setting: str | None) -> None:
         raise BadInputError(
             f"proofs need {error.name}: install the extra, pip install 'discreta[prove]'"
         ) from None
+    for method in methods:
+        _check_width(method, width)
     out = Console(highlight=False, soft_wrap=True)
     jobs = [
         (method, variant)
@@ -504,9 +666,10 @@ def survey_command(method: Method, width: int, setting: str | None, whole_degree
     """Run all blocks of a kind, or a seeded sample, and judge every step and every register.
 
     Lines: of all lengths. Arcs: all quarter arcs and circles about the origin, some circles ten
-    times round, and a sample of any arcs. Clocks are those in which the device sums, per step of
-    the axis that moves faster. Runs on the compiled engine. Exits 1 when a register differs from
-    the golden model or an end is missed.
+    times round, and a sample of any arcs. Conics: 20,000 of every kind, and some ellipses ten times
+    round. The column 99.9 % has the error that so many of the blocks do not exceed. Clocks are
+    those in which the device sums, per step of the axis that moves faster. Runs on the compiled
+    engine. Exits 1 when a register differs from the golden model or an end is missed.
 
     Example: discreta survey linear --width 8
     """
@@ -540,9 +703,9 @@ def survey_command(method: Method, width: int, setting: str | None, whole_degree
         refused = sum(group.answers != 0)
         to_refuse = f", {refused} to be refused" if refused else ""
         title = f"{method.name}, width {width}: {group.title}{to_refuse}, {compared} compared"
-        headings = ["variant", "largest error", f"on the {method.curve}", "at", "clocks/step"]
-        headings += ["ends missed"]
-        headings += ["completed"] if method.curve == "arc" else []
+        headings = ["variant", "largest error", "99.9 %", f"on the {method.curve}", "at"]
+        headings += ["clocks/step", "ends missed"]
+        headings += [] if method.curve == "line" else ["completed"]
         headings += [] if every else ["compared"]
         table = Table(box=None, pad_edge=False)
         for heading in headings:
@@ -551,6 +714,7 @@ def survey_command(method: Method, width: int, setting: str | None, whole_degree
             cells = {
                 "variant": say_choices(row.variant),
                 "largest error": f"{row.largest_error:.4f}",
+                "99.9 %": f"{row.usual_error:.4f}",
                 "clocks/step": f"{row.summations / row.length:.4f}",
                 "ends missed": str(row.ends_missed),
                 "completed": str(row.completed),

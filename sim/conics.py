@@ -18,24 +18,29 @@ described by. Clockwise motion is the counter-clockwise one in a mirror.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 
-from discreta.hdl.conic import TURNS_BITS, coefficient_bits, linear_bits
-from discreta.sim.points import BadInputError, check_line, say_point
+from discreta.hdl.conic import MAX_WIDTH, TURNS_BITS, coefficient_bits, linear_bits
+from discreta.hdl.contract import check_width
+from discreta.sim.points import BadInputError, check_coordinates, give_width, say_point
 
 __all__ = [
     "KINDS",
     "ConicBlock",
+    "check_block",
+    "curve_near",
     "curve_points",
     "distance",
     "ellipse",
     "from_coefficients",
     "parabola",
     "random_blocks",
+    "travel",
 ]
 
 Number = int | float | Fraction
@@ -44,6 +49,9 @@ KINDS = ("line", "circle", "ellipse", "parabola", "hyperbola")
 
 #: In steps: the smallest radius of curvature, how far an end may be off the curve, and no distance.
 _SHARPEST, _OFF, _NOTHING = 2.0, 1.0, 1e-6
+
+#: Steps of Newton's method from the first guess before a nearest point is searched.
+_NEWTON = 3
 
 #: Points at which an arc is looked at, and scales that are tried, when coefficients are rounded.
 _SAMPLES, _SCALES = 4096, 1 << 14
@@ -79,8 +87,9 @@ def _foot(
     """Give the way (x, y) from points to the nearest points of their curves.
 
     A nearest point is w = −m·(1 + m·H)⁻¹·G away, with H the second derivatives and m a number for
-    which the curve is met. The one that keeps 1 + m·H positive belongs to the nearest of all, and
-    between its limits the curve's value falls: one root, found by Newton's method in a bracket.
+    which the curve is met. The one that keeps 1 + m·H positive belongs to the nearest of all. It is
+    f/|G|² for a straight line, and near a curve Newton's method needs a step or two from there;
+    where it does not lead to an m that is well within its limits, they are searched.
 
     Parameters
     ----------
@@ -89,21 +98,63 @@ def _foot(
     a, b, c : arrays of float
         Broadcast against them.
     """
+    shape = np.broadcast_shapes(np.shape(value), np.shape(a))
+    rows = tuple(np.broadcast_to(row, shape).ravel() for row in (value, gx, gy, a, b, c))
+    found = np.empty((2, len(rows[0])))
+    rest = np.arange(len(rows[0]))
+    with np.errstate(all="ignore"):
+        f, gx, gy, a, b, c = rows
+        steep = gx * gx + gy * gy
+        m = f / steep
+        m *= 1 + 3 * m * (a * gx * gx + b * gx * gy + c * gy * gy) / steep
+        for _ in range(_NEWTON):
+            f, gx, gy, a, b, c = rows
+            # 1 + m·H, and k = (1 + m·H)⁻¹·G: the gradient at the foot.
+            t1, t2, cross = 1 + 2 * a * m, 1 + 2 * c * m, b * m
+            whole = t1 * t2 - cross * cross
+            kx, ky = (t2 * gx - cross * gy) / whole, (t1 * gy - cross * gx) / whole
+            # By how much the foot moves with m.
+            px, py = (t2 * kx - cross * ky) / whole, (t1 * ky - cross * kx) / whole
+            left = f - m / 2 * (kx * (gx + kx) + ky * (gy + ky))
+            more = left / (kx * px + ky * py)
+            found[:, rest] = -m * kx - more * px, -m * ky - more * py
+            # What is still wrong is about the square of this last part over the radius.
+            part = more * more * (px * px + py * py) * (np.abs(a) + np.abs(b) + np.abs(c))
+            trace = t1 + t2
+            close = part * part < 1e-22 * (kx * kx + ky * ky)
+            coarse = ~(close & (trace > 0) & (whole > 0.1 * trace))
+            rest = rest[coarse]
+            if not len(rest):
+                break
+            m = (m + more)[coarse]
+            rows = tuple(row[coarse] for row in rows)
+    if len(rest):
+        found[:, rest] = _searched(*rows)
+    wx, wy = found.reshape(2, *shape)
+    return wx, wy
+
+
+def _searched(
+    value: np.ndarray, gx: np.ndarray, gy: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Give what :func:`_foot` gives, for any points, shape (points,).
+
+    Between the limits of m the curve's value falls: one root, found by Newton's method in a
+    bracket.
+    """
     turned = 0.5 * np.arctan2(b, a - c)
     cos, sin = np.cos(turned), np.sin(turned)
     spread = np.hypot(a - c, b)
-    shape = np.broadcast_shapes(np.shape(value), np.shape(a))
 
     def along(second: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # From a point on an axis of the curve two points can be equally near, and m is at its
         # limit: a hundred millionth of a step aside it is not.
         least = 1e-8 * np.abs(second)
-        first = np.where(np.abs(first) < least, np.copysign(least, first), first)
-        return np.broadcast_to(second, shape).ravel(), np.broadcast_to(first, shape).ravel()
+        return second, np.where(np.abs(first) < least, np.copysign(least, first), first)
 
     h1, g1 = along(a + c + spread, cos * gx + sin * gy)
     h2, g2 = along(a + c - spread, cos * gy - sin * gx)
-    f = np.broadcast_to(value, shape).ravel()
+    f = value
     with np.errstate(divide="ignore", invalid="ignore"):
         low = np.where(h1 > 0, -1 / h1, -np.inf)
         high = np.where(h2 < 0, -1 / h2, np.inf)
@@ -129,7 +180,7 @@ def _foot(
         rest = rest[coarse]
         rows = (f, h1, h2, g1, g2, low, high, m)
         f, h1, h2, g1, g2, low, high, m = (row[coarse] for row in rows)
-    w1, w2 = found.reshape(2, *shape)
+    w1, w2 = found
     return cos * w1 - sin * w2, sin * w1 + cos * w2
 
 
@@ -137,23 +188,27 @@ def _to_curve(
     coefficients: np.ndarray, starts: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Give the ways (x, y) from points to their curves; parameters as for :func:`distance`."""
-    whole = np.rint(points)
-    px, py = np.moveaxis(np.asarray(points - whole, dtype=float), -1, 0)
-    reach = 1.0 + float(max(np.abs(whole).max(initial=0), np.abs(starts).max(initial=0)))
-    square, linear = (
-        float(np.abs(part).max(initial=0)) for part in np.split(coefficients, [3], axis=-1)
+    whole = np.rint(points).astype(np.int64)
+    a, b, c, d, e = np.moveaxis(coefficients, -1, 0)
+    x0, y0 = np.moveaxis(starts, -1, 0)
+    x, y = np.moveaxis(whole, -1, 0)
+    u, v = x - x0, y - y0
+    hx, hy = 2 * a * u + b * v, b * u + 2 * c * v
+    gx, gy = 2 * a * x0 + b * y0 + d, b * x0 + 2 * c * y0 + e
+    # 2f: what 64 bits lose of the products is nothing in the sum, unless that is too large itself.
+    sides = hx + 2 * gx, hy + 2 * gy
+    with np.errstate(over="ignore"):
+        exact = np.asarray(u * sides[0] + v * sides[1], dtype=float)
+    a, b, c, u, v, gx, gy, *sides = (
+        np.asarray(row, dtype=float) for row in (a, b, c, u, v, gx + hx, gy + hy, *sides)
     )
-    # |f| ≤ |u|·(|a·(x + x0)| + |b·y0| + |d|) + |v|·(…) with |u|, |x + x0| ≤ 2·reach.
-    kind = np.int64 if 4 * reach * (3 * reach * square + linear) < 2**62 else object
-    a, b, c, d, e = np.moveaxis(coefficients.astype(kind), -1, 0)
-    x0, y0 = np.moveaxis(starts.astype(kind), -1, 0)
-    x, y = np.moveaxis(whole.astype(np.int64).astype(kind), -1, 0)
-    value = (x - x0) * (a * (x + x0) + b * y0 + d) + (y - y0) * (c * (y + y0) + b * x + e)
-    gx, gy = 2 * a * x + b * y + d, b * x + 2 * c * y + e
-    value, gx, gy, a, b, c = (np.asarray(row, dtype=float) for row in (value, gx, gy, a, b, c))
-    # f is exact on the grid, and the way from there is short.
-    value = value + px * (gx + a * px + b * py) + py * (gy + c * py)
-    gx, gy = gx + 2 * a * px + b * py, gy + b * px + 2 * c * py
+    rough = u * sides[0] + v * sides[1]
+    value = np.where(np.abs(rough) < 2**62, exact, rough) / 2
+    if not np.issubdtype(points.dtype, np.integer):
+        # f is exact on the grid, and the way from there is short.
+        px, py = np.moveaxis(np.asarray(points - whole, dtype=float), -1, 0)
+        value = value + px * (gx + a * px + b * py) + py * (gy + c * py)
+        gx, gy = gx + 2 * a * px + b * py, gy + b * px + 2 * c * py
     return _foot(value, gx, gy, a, b, c)
 
 
@@ -165,11 +220,11 @@ def distance(coefficients: np.ndarray, starts: np.ndarray, points: np.ndarray) -
 
     Parameters
     ----------
-    coefficients : array of int, shape (..., 5)
-        a, b, c, d, e of a curve; int64, or objects when they need more bits.
-    starts : array of int, shape (..., 2)
+    coefficients : array of int64, shape (..., 5)
+        a, b, c, d, e of a curve, of the bits that a block has for them.
+    starts : array of int64, shape (..., 2)
         A point of each curve.
-    points : array of int or float, shape (..., 2)
+    points : array of int64 or float, shape (..., 2)
         In steps. All three are broadcast against each other.
     """
     return np.hypot(*_to_curve(coefficients, starts, points))
@@ -307,21 +362,12 @@ def _course(
     least = most = np.full((2, len(fx)), np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
         for index in range(1, 5):
-            axis = (begins + index) % 4
             passed = crossed >= index
-            nx, ny = (axis == 0) * 1.0 - (axis == 2), (axis == 1) * 1.0 - (axis == 3)
-            length = np.sqrt(bend / np.where(axis % 2, a, c))
-            nx, ny = nx * length, ny * length
-            s = (gx * ny - gy * nx) / (2 * bend)
-            cos = (2 * c * gx * nx - b * (gx * ny + gy * nx) + 2 * a * gy * ny) / (2 * bend)
-            k = np.where(cos > -0.5, s * s / (1 + cos), (1 - cos) / curl)
-            place = np.stack(
-                [k * (b * gy - 2 * c * gx) - s * gy, k * (b * gx - 2 * a * gy) + s * gx]
-            )
+            place = _extreme((a, b, c, gx, gy), curl, bend, (begins + index) % 4)
             least = np.where(passed, np.fmin(least, place), least)
             most = np.where(passed, np.fmax(most, place), most)
         # The gradient is smallest along the direction of the smaller second derivative.
-        second = a + c + np.hypot(a - c, b)
+        spread = np.hypot(a - c, b)
         first = np.arctan2(gy, gx)
         swept = np.where(time == period, 2 * np.pi, (np.arctan2(ey, ex) - first) % (2 * np.pi))
         swept = np.where(time > 0, swept, 0)
@@ -329,10 +375,12 @@ def _course(
         for turned in (0.5, 1.5):
             way = (0.5 * np.arctan2(b, a - c) + turned * np.pi - first) % (2 * np.pi)
             smallest = np.where(
-                way < swept, np.fmin(smallest, np.sqrt(2 * bend / second)), smallest
+                way < swept,
+                np.fmin(smallest, np.sqrt(2 * bend / (a + c + spread))),
+                smallest,
             )
         radius = np.where(straight, np.inf, smallest**3 / (2 * bend))
-        room = np.where(straight, np.inf, smallest / second)
+        room = np.where(straight, np.inf, smallest / (np.abs(a + c) + spread))
     sign = np.where(clockwise, -1, 1)
     return _Course(
         **whole_numbers,
@@ -349,6 +397,31 @@ def _course(
         least=np.stack([least[0], np.where(clockwise, -most[1], least[1])]),
         most=np.stack([most[0], np.where(clockwise, -least[1], most[1])]),
     )
+
+
+def _extreme(
+    local: tuple[np.ndarray, ...], curl: np.ndarray, bend: np.ndarray, axis: np.ndarray
+) -> np.ndarray:
+    """Give where curves are when their gradient comes to an axis, from the start, shape (2, …).
+
+    Parameters
+    ----------
+    local : five arrays of float
+        a, b, c, and Gx, Gy at the start, run counter-clockwise.
+    curl, bend : arrays of float
+        4ac − b² and Q.
+    axis : array of int
+        0 to 3: +x, +y, −x, −y. There is such a place, or what is given is no number.
+    """
+    a, b, c, gx, gy = local
+    nx, ny = (axis == 0) * 1.0 - (axis == 2), (axis == 1) * 1.0 - (axis == 3)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        length = np.sqrt(bend / np.where(axis % 2, a, c))
+        nx, ny = nx * length, ny * length
+        s = (gx * ny - gy * nx) / (2 * bend)
+        cos = (2 * c * gx * nx - b * (gx * ny + gy * nx) + 2 * a * gy * ny) / (2 * bend)
+        k = np.where(cos > -0.5, s * s / (1 + cos), (1 - cos) / curl)
+        return np.stack([k * (b * gy - 2 * c * gx) - s * gy, k * (b * gx - 2 * a * gy) + s * gx])
 
 
 def _quadrant(gx: np.ndarray, gy: np.ndarray, *, after: bool) -> np.ndarray:
@@ -390,7 +463,7 @@ def _flaws(course: _Course, start: np.ndarray, width: int) -> dict[str, np.ndarr
     runs = course.time != 0
     low, high = start + course.least, start + course.most
     outside = (low < 1 - 2**width) | (high > 2**width - 2)
-    sharpest = np.fmin(course.radius, course.room)
+    least = _SHARPEST * (1 - 1e-9)
     flaws = {
         "still": course.size == 0,
         "lines": (course.bend == 0) & ~course.straight,
@@ -398,7 +471,8 @@ def _flaws(course: _Course, start: np.ndarray, width: int) -> dict[str, np.ndarr
         "branch": course.other,
         "behind": np.isnan(course.time),
         "sharp start": runs & (course.size < 4 * course.second),
-        "sharp": runs & (sharpest < _SHARPEST * (1 - 1e-9)),
+        "sharp": runs & (course.radius < least),
+        "narrow": runs & (course.room < least),
         "outside": runs & outside.any(axis=0),
     }
     return {flaw: np.asarray(found, dtype=bool) for flaw, found in flaws.items()}
@@ -476,8 +550,7 @@ class _Curve:
                 raise BadInputError(f"{full_turns} whole turns cannot be made: give 0 or more")
             if not np.isfinite(course.period[0]):
                 raise BadInputError(
-                    f"the {self.kind} has no whole turns, and {full_turns} of them are asked for: "
-                    "leave them out"
+                    f"a {self.kind} does not come back to its start: leave the turns out"
                 )
             self._refuse(self.course(self.start), self.start, width)
         turns = int(course.turns[0]) + 4 * full_turns
@@ -500,24 +573,27 @@ class _Curve:
         room = 2**width
         # Rounded so that what is too much or too little is seen to be so.
         off = np.ceil(100 * course.off[0]) / 100
-        sharpest = np.floor(100 * min(course.radius[0], course.room[0])) / 100
+        sharpest, narrow = np.floor(100 * np.array([course.radius[0], course.room[0]])) / 100
         steep = 100 * course.size[0] // max(1, course.second[0]) / 100
-        reach = next(
-            (
-                f"{axis} = {start + value[0]:.1f}"
+        reach, cure = "", ""
+        if flaw == "outside":
+            extremes = [
+                (axis, own + float(value[0]))
                 for bounds in (course.least, course.most)
-                for axis, start, value in zip("xy", self.start, bounds, strict=True)
-                if not 1 - room <= start + value[0] <= room - 2 and not np.isnan(value[0])
-            ),
-            "",
-        )
+                for axis, own, value in zip("xy", self.start, bounds, strict=True)
+                if not np.isnan(value[0])
+            ]
+            axis, value = max(extremes, key=lambda extreme: max(extreme[1] + 1, -extreme[1]))
+            reach = f"{axis} = {value:.1f}"
+            enough = [w for w in range(width, MAX_WIDTH + 1) if 1 - 2**w <= value <= 2**w - 2]
+            cure = f"{give_width(enough, MAX_WIDTH)} or" if enough else "give"
         stop = say_point(end)
         raise BadInputError(
             {
                 "still": f"the curve has no direction at its start {start}, where both derivatives "
                 "are 0: start at another point",
                 "lines": f"the curve through {start} is a pair of straight lines, where a curve is "
-                "needed: give a line by its own d and e, with a, b and c = 0",
+                "needed: give a line by its own D and E, with A, B and C = 0",
                 "off": f"the end {stop} is {off:.2f} steps off the curve, where at most "
                 f"{_OFF:g} is allowed: end at a point such as {near}",
                 "branch": f"the end {stop} is on the other branch of the hyperbola: end on the "
@@ -525,12 +601,15 @@ class _Curve:
                 "behind": f"the end {stop} is not ahead of the start {start} on the {self.kind}: "
                 "run it the other way round, or exchange start and end",
                 "sharp start": f"the curve is too sharp at its start {start}: |Gx| + |Gy| is "
-                f"{steep:.2f} times |a| + |b| + |c|, where 4 "
+                f"{steep:.2f} times |A| + |B| + |C|, where 4 "
                 "times is needed; start at a flatter place or make the curve larger",
                 "sharp": f"the curve is too sharp: it bends within {sharpest:.2f} steps, where "
                 f"{_SHARPEST:g} are needed; leave the sharp place out or make the curve larger",
+                "narrow": f"the {self.kind} comes within {narrow:.2f} steps of a point without a "
+                f"direction, where {_SHARPEST:g} are needed; leave that place out or make the "
+                "curve larger",
                 "outside": f"the curve goes as far as {reach}, where width {width} has room for "
-                f"{1 - room} to {room - 2}: give a larger width or a shorter arc",
+                f"{1 - room} to {room - 2} between start and end; {cure} a shorter arc",
             }[flaw]
         )
 
@@ -597,20 +676,31 @@ def _round(curve: _Curve, arc: np.ndarray, width: int) -> _Curve:
             return found
     raise BadInputError(
         f"the coefficients of the {curve.kind} are too far apart for those of width {width}, which "
-        f"have {coefficient_bits(width)} and {linear_bits(width)} bits: give a larger width"
+        f"have {coefficient_bits(width)} and {linear_bits(width)} bits: {_more_bits(width)}"
     )
 
 
-def _arc(curve: _Curve, course: _Course, points: int) -> np.ndarray:
-    """Give points of the curve, evenly spread in time, shape (2, points), from the start."""
-    time = np.linspace(0, course.time[0], points)
+def _more_bits(width: int) -> str:
+    """Give the cure for what a few bits more may do for."""
+    return f"give a larger --width, up to {MAX_WIDTH}" if width < MAX_WIDTH else "there are no more"
+
+
+def _arc(curve: _Curve, course: _Course, time: np.ndarray) -> np.ndarray:
+    """Give where the motion has come to at these times, shape (2, times), from the start."""
     local = [float(number) for number in curve.local]
     # From both ends: the way along a hyperbola grows without limit, and its rounding with it.
-    head = _flow(local, curve.clockwise, time[: points // 2])
-    gradient = course.gradient[:, 0]
-    left = time[-1] - time[points // 2 :]
-    back = _flow([*local[:3], *gradient], not curve.clockwise, left)
-    return np.concatenate([head, course.foot + back], axis=1)
+    late = time > course.time[0] / 2
+    back = [*local[:3], *course.gradient[:, 0]]
+    points = np.empty((2, len(time)))
+    points[:, ~late] = _flow(local, curve.clockwise, time[~late])
+    left = course.time[0] - time[late]
+    points[:, late] = course.foot + _flow(back, not curve.clockwise, left)
+    return points
+
+
+def _spread(course: _Course, points: int) -> np.ndarray:
+    """Give times evenly spread over the way."""
+    return np.linspace(0, course.time[0], points)
 
 
 def _numbers(what: str, numbers: Sequence[Number], count: int) -> list[Fraction]:
@@ -625,8 +715,39 @@ def _numbers(what: str, numbers: Sequence[Number], count: int) -> list[Fraction]
 
 def _point(point: Sequence[int], width: int) -> tuple[int, int]:
     x, y = (int(value) for value in point)
-    check_line((x, y), (x, y), width)
+    check_coordinates([(x, y)], width, MAX_WIDTH)
     return x, y
+
+
+def _wider(width: int, fits: Callable[[int], bool]) -> str:
+    """Give the cure where a width must do for what this one does not."""
+    return give_width([more for more in range(width + 1, MAX_WIDTH + 1) if fits(more)], MAX_WIDTH)
+
+
+def _check_width(width: int) -> None:
+    try:
+        check_width(width, MAX_WIDTH)
+    except ValueError as error:
+        raise BadInputError(str(error)) from None
+
+
+def check_block(block: Sequence[int], width: int) -> None:
+    """Refuse a block that does not fit a device of ``width`` bits; its curve is not looked at.
+
+    Raises
+    ------
+    BadInputError
+        The width, a coefficient or a coordinate is out of range.
+    """
+    _check_width(width)
+    five, points = block[:5], (block[5:7], block[7:9])
+    check_coordinates(points, width, MAX_WIDTH)
+    if not _fits(five, width):
+        cure = _wider(width, lambda more: _fits(five, more))
+        raise BadInputError(
+            f"the coefficients {say_point(five)} are out of range: width {width} has room for "
+            f"{' and '.join(map(str, _edges(width)))}; {cure}"
+        )
 
 
 def from_coefficients(
@@ -651,7 +772,7 @@ def from_coefficients(
         In steps; the end is on the curve or up to a step off it.
     clockwise : bool
     width : int
-        4 to 32.
+        4 to 24.
     full_turns : int
         Whole turns before the arc itself.
 
@@ -661,6 +782,7 @@ def from_coefficients(
         The curve cannot be run from start to end; the message names the reason, the limit, the
         cure.
     """
+    _check_width(width)
     five = _numbers("coefficients", coefficients, 5)
     start, end = _point(start, width), _point(end, width)
     curve = _Curve.of_coefficients(five, start, clockwise)
@@ -680,7 +802,7 @@ def _make(
             row = (*exact, *curve.start, *end, int(curve.clockwise), turns)
             return ConicBlock(row, curve.kind, 0.0)
     passed = curve.course(curve.start) if full_turns else course
-    arc = _arc(curve, passed, _SAMPLES)
+    arc = _arc(curve, passed, _spread(passed, _SAMPLES))
     rounded = _round(curve, arc[:, :: _SAMPLES // 128], width)
     return _stand_in(rounded, end, curve.kind, arc, width, full_turns)
 
@@ -690,7 +812,7 @@ def _stand_in(
 ) -> ConicBlock:
     """Make the block of a curve that stands for an arc, shape (2, points), from its start."""
     course = curve.refuse(end, width, full_turns)
-    five, start = np.array(curve.coefficients, dtype=object), np.array(curve.start)
+    five, start = np.array(curve.coefficients), np.array(curve.start)
     moved = float(distance(five, start, arc.T + start).max())
     turns = int(course.turns[0]) + 4 * full_turns
     return ConicBlock((*five, *curve.start, *end, int(curve.clockwise), turns), kind, moved)
@@ -708,13 +830,14 @@ def parabola(
     control : two int
         Where the tangents at start and end meet; it may lie outside the coordinates.
     width : int
-        4 to 32.
+        4 to 24.
 
     Raises
     ------
     BadInputError
         The parabola cannot be run; the message names the reason, the limit, the cure.
     """
+    _check_width(width)
     start, end = _point(start, width), _point(end, width)
     # start + t·p + t²·q; t is found from (u, v) as (u, v) × q / (p × q).
     px, py = (2 * (int(m) - s) for s, m in zip(start, control, strict=True))
@@ -755,7 +878,7 @@ def ellipse(
     angle_degrees : number
         From the x axis to the first semi-axis.
     width : int
-        4 to 32.
+        4 to 24.
     start_angle, end_angle : numbers
         In degrees of the angle that describes the ellipse: 0 is the end of the first semi-axis, 90
         that of the second. Equal ones are a whole turn.
@@ -768,20 +891,24 @@ def ellipse(
     BadInputError
         The ellipse cannot be run; the message names the reason, the limit, the cure.
     """
+    _check_width(width)
     r1, r2 = _numbers("semi-axes", semi_axes, 2)
     longest = 2 ** (width + 8)
     for semi_axis in (r1, r2):
-        if not _SHARPEST <= semi_axis <= longest:
+        if semi_axis < _SHARPEST:
             raise BadInputError(
-                f"the semi-axis {float(semi_axis):g} is out of range: width {width} has room for "
-                f"{_SHARPEST:g} to {longest} steps"
+                f"the semi-axis {float(semi_axis):g} is too short: give {_SHARPEST:g} or more"
             )
     middle = [int(value) for value in center]
-    for value in middle:
-        if abs(value) > longest:
+    for what, said, far in (
+        ("semi-axis", f"{float(max(r1, r2)):g}", max(r1, r2)),
+        ("center", say_point(middle), max(map(abs, middle))),
+    ):
+        if far > longest:
+            cure = _wider(width, lambda more, far=far: far <= 2 ** (more + 8))
             raise BadInputError(
-                f"the centre {say_point(middle)} is out of range: width {width} has room for "
-                f"{-longest} to {longest}"
+                f"the {what} {said} is out of range: width {width} has room for {longest} steps; "
+                f"{cure}"
             )
     turned, first, last = _numbers("angles", (angle_degrees, start_angle, end_angle), 3)
     # a·u² + b·u·v + c·v² = r1²·r2² around the centre.
@@ -820,7 +947,7 @@ def ellipse(
     end = start
     if sweep < 360:
         last_point = arc[:, -1] + origin
-        last_point += _to_curve(np.array(curve.coefficients, dtype=object), origin, last_point)
+        last_point += _to_curve(np.array(curve.coefficients), origin, last_point)
         end = _point([round(value) for value in last_point], width)
     course = curve.course(end)
     if abs(course.time[0] / course.period[0] - float(sweep) / 360) > 0.5:
@@ -847,6 +974,46 @@ def _rotated(x, y, cos, sin):
     return cos * x - sin * y, sin * x + cos * y
 
 
+class _Outline:
+    """The way that a block goes, for pictures; whole turns are gone through once.
+
+    Raises
+    ------
+    BadInputError
+        The curve does not lead from start to end.
+    """
+
+    def __init__(self, block: Sequence[int] | np.ndarray):
+        *five, x, y, end_x, end_y, clockwise, turns = (int(value) for value in block)
+        self._curve = _Curve.of_coefficients(five, (x, y), bool(clockwise))
+        self._course = self._curve.course((end_x, end_y))
+        if np.isnan(self._course.time[0]):
+            raise BadInputError(
+                f"the {self._curve.kind} does not lead from {x},{y} to {end_x},{end_y}: give "
+                "another end"
+            )
+        if np.isfinite(self._course.period[0]) and turns > self._course.turns[0] + 1:
+            self._course = self._curve.course((x, y))
+
+    def times(self, points: int) -> np.ndarray:
+        """Give times evenly spread over the way."""
+        return _spread(self._course, points)
+
+    def at(self, time: np.ndarray) -> np.ndarray:
+        """Give where it is at these times, shape (times, 2), in steps."""
+        start, five = np.array(self._curve.start), np.array(self._curve.coefficients)
+        points = _arc(self._curve, self._course, time).T + start
+        return points + np.stack(_to_curve(five, start, points), axis=-1)
+
+    def acceleration(self, points: np.ndarray) -> np.ndarray:
+        """Give the size of the acceleration at points of it, shape (points,)."""
+        a, b, c, *_ = (float(number) for number in self._curve.local)
+        d, e = (float(number) for number in self._curve.coefficients[3:])
+        x, y = points.T
+        gx, gy = 2 * a * x + b * y + d, b * x + 2 * c * y + e
+        return np.hypot(b * gy - 2 * c * gx, b * gx - 2 * a * gy)
+
+
 def curve_points(block: Sequence[int] | np.ndarray, most: int = 4096) -> np.ndarray:
     """Give points of a block's curve in the order of the motion, for a picture.
 
@@ -863,25 +1030,92 @@ def curve_points(block: Sequence[int] | np.ndarray, most: int = 4096) -> np.ndar
     BadInputError
         The curve does not lead from start to end.
     """
-    *five, x, y, end_x, end_y, clockwise, turns = (int(value) for value in block)
-    curve = _Curve.of_coefficients(five, (x, y), bool(clockwise))
-    course = curve.course((end_x, end_y))
-    if np.isnan(course.time[0]):
-        raise BadInputError(
-            f"the {curve.kind} does not lead from {x},{y} to {end_x},{end_y}: give another end"
-        )
-    if np.isfinite(course.period[0]) and turns > course.turns[0] + 1:
-        course = curve.course((x, y))
-    start = np.array([x, y])
+    way = _Outline(block)
     # The way between two points is off its chord by at most |acceleration|·time²/8.
-    few = _arc(curve, course, 65)
-    a, b, c, gx, gy = (float(number) for number in curve.local)
-    gx, gy = gx + 2 * a * few[0] + b * few[1], gy + b * few[0] + 2 * c * few[1]
-    fastest = np.hypot(b * gy - 2 * c * gx, b * gx - 2 * a * gy).max()
-    needed = 2 + course.time[0] * math.sqrt(fastest / (8 * 0.01))
-    points = _arc(curve, course, max(2, int(min(needed, most)))).T + start
-    five = np.array(curve.coefficients, dtype=object)
-    return points + np.stack(_to_curve(five, start, points), axis=-1)
+    few = way.times(65)
+    fastest = way.acceleration(way.at(few)).max()
+    needed = 2 + few[-1] * math.sqrt(fastest / (8 * 0.01))
+    return way.at(way.times(max(2, int(min(needed, most)))))
+
+
+def curve_near(block: Sequence[int] | np.ndarray, point: np.ndarray, reach: float) -> np.ndarray:
+    """Give what of a block's curve lies near a point, for a picture, fine however large it is.
+
+    Parameters
+    ----------
+    block : 11 int
+    point : two numbers
+    reach : float
+        In steps.
+
+    Returns
+    -------
+    array of float, shape (points, 2)
+        At most a tenth of a step from each other, in steps; between pieces there is a row of NaN.
+
+    Raises
+    ------
+    BadInputError
+        The curve does not lead from start to end.
+    """
+    way = _Outline(block)
+    edges = way.times(1025)
+    first, last = edges[:-1], edges[1:]
+    while True:
+        one, other = way.at(first), way.at(last)
+        chord, to_point = other - one, point - one
+        square = (chord * chord).sum(axis=1)
+        part = np.clip((to_point * chord).sum(axis=1) / np.fmax(square, 1e-30), 0, 1)
+        off = np.hypot(*(to_point - part[:, None] * chord).T)
+        bulge = np.fmax(way.acceleration(one), way.acceleration(other)) * (last - first) ** 2 / 4
+        near = off - bulge <= reach
+        first, last, one, other = (row[near] for row in (first, last, one, other))
+        if square[near].max(initial=0) <= 0.01:
+            break
+        cuts = first + np.linspace(0, 1, 9)[:, None] * (last - first)
+        cuts[-1] = last
+        first, last = cuts[:-1].T.ravel(), cuts[1:].T.ravel()
+    pieces = [np.empty((0, 2))]
+    breaks = np.flatnonzero(first[1:] != last[:-1]) + 1
+    for piece in np.split(np.arange(len(first)), breaks):
+        pieces += [one[piece], other[piece[-1:]], np.full((1, 2), np.nan)]
+    return np.concatenate(pieces)[:-1]
+
+
+def travel(blocks: np.ndarray, width: int) -> np.ndarray:
+    """Give how far x and y go on the curves of blocks, both together, in steps, shape (blocks,).
+
+    Quick, for many blocks at once, and only as exact as it takes to judge how long they run.
+
+    Parameters
+    ----------
+    blocks : array of int64, shape (blocks, 11)
+    width : int
+        No curve goes beyond the coordinates that it has.
+    """
+    a, b, c, d, e, x, y, end_x, end_y, clockwise, turns = blocks.T
+    mirror = np.where(clockwise, -1, 1)
+    gx, gy = 2 * a * x + b * y + d, mirror * (b * x + 2 * c * y + e)
+    curl, begins = 4 * a * c - b * b, _quadrant(gx, gy, after=True)
+    local = tuple(np.asarray(row, dtype=np.longdouble) for row in (a, mirror * b, c, gx, gy))
+    a, b, c, gx, gy = local
+    bend = a * gy * gy - b * gx * gy + c * gx * gx
+    start, room = np.stack([x, mirror * y]), 2.0**width
+    goal = np.stack([end_x, mirror * end_y])
+
+    def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        return np.abs(one - other).sum(axis=0)
+
+    # Where the changes of direction are; from the fifth on, where they were before.
+    places = [start + _extreme(local, curl, bend, (begins + k) % 4) for k in range(1, 5)]
+    places = [np.clip(np.nan_to_num(place, nan=room), -room, room) for place in places]
+    around = sum(apart(one, other) for one, other in pairwise([*places, places[0]]))
+    rounds = np.fmax(turns - 1, 0) // 4
+    way, here = rounds * around, start
+    for k, place in enumerate(places):
+        passed = turns - 4 * rounds > k
+        way, here = way + np.where(passed, apart(here, place), 0), np.where(passed, place, here)
+    return np.asarray(way + apart(here, goal), dtype=float)
 
 
 # Random blocks
@@ -898,22 +1132,21 @@ def random_blocks(kind: str, width: int, count: int, random: np.random.Generator
     kind : str
         One of :data:`KINDS`.
     width : int
-        4 to 32.
+        4 to 24.
     count : int
     random : numpy.random.Generator
 
     Returns
     -------
-    array, shape (count, 11)
-        Of int64, or of objects from width 30 on.
+    array of int64, shape (count, 11)
     """
+    check_width(width, MAX_WIDTH)
     if kind not in KINDS:
         raise ValueError(f"kind is {kind!r}: choose {' or '.join(map(repr, KINDS))}")
-    found = [np.empty((0, 11), dtype=object)]
+    found = [np.empty((0, 11), dtype=np.int64)]
     while (missing := count - sum(map(len, found))) > 0:
         found.append(_draw(kind, width, min(1 << 14, 2 * missing + 64), random))
-    blocks = np.concatenate(found)[:count]
-    return blocks.astype(np.int64) if linear_bits(width) <= 64 else blocks
+    return np.concatenate(found)[:count]
 
 
 def _logarithmic(
@@ -1013,4 +1246,4 @@ def _draw(kind: str, width: int, count: int, random: np.random.Generator) -> np.
     good &= np.asarray(np.abs(five) <= edges[:, None], dtype=bool).all(axis=0)
     turns = course.turns + 4 * (whole & (random.random(len(whole)) < 1 / 16))
     rows = [*five, *start, *(start + end), clockwise.astype(object), turns.astype(object)]
-    return np.array(rows, dtype=object).T[good]
+    return np.array(rows, dtype=object).T[good].astype(np.int64)

@@ -5,9 +5,20 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from discreta.sim.arcs import is_empty
+from discreta.sim.conics import distance
 from discreta.sim.stretch import EVENT_COLUMNS, Stretch
 
-__all__ = ["ArcContour", "Contour", "LineContour", "distance_from_circle", "distance_from_line"]
+__all__ = [
+    "ArcContour",
+    "ConicContour",
+    "Contour",
+    "LineContour",
+    "distance_from_circle",
+    "distance_from_line",
+]
+
+#: Points that are compared with curves at a time: what they need stays in a processor's cache.
+_BATCH = 1 << 14
 
 
 def _squarable(*points: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -236,3 +247,31 @@ class ArcContour(Contour):
         """Give the distances of points from the circles of their blocks."""
         centers = self.centers[blocks]
         return distance_from_circle(points - centers, self.starts[blocks] - centers)
+
+
+class ConicContour(Contour):
+    """Follows blocks of second-order curves: the distance of a point is that from its whole curve.
+
+    The curve goes through the block's start; an end that is off it by part of a step has that much
+    of an error itself.
+
+    Parameters
+    ----------
+    blocks : array of int64, shape (blocks, 11)
+        See :mod:`discreta.sim.conics`.
+    """
+
+    def __init__(self, blocks: np.ndarray):
+        starts, ends = blocks[:, 5:7], blocks[:, 7:9]
+        super().__init__(starts, ends, np.all(starts == ends, axis=1) & (blocks[:, 10] == 0))
+        # The values of a field side by side, which is quicker to work with.
+        self._curves = np.ascontiguousarray(blocks[:, :7].T)
+
+    def errors(self, points: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+        """Give the distances of points from the curves of their blocks."""
+        errors = np.empty(len(points))
+        for first in range(0, len(points), _BATCH):
+            part = slice(first, first + _BATCH)
+            curves = self._curves[:, blocks[part]]
+            errors[part] = distance(curves[:5].T, curves[5:].T, points[part])
+        return errors

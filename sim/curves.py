@@ -1,4 +1,4 @@
-"""What can be run: a polyline of lines, or an arc. Blocks, checks, and the true curve to draw."""
+"""What can be run: lines, an arc, or a conic. Blocks, checks, and the true curve to draw."""
 
 from collections.abc import Sequence
 from math import atan2, ceil, degrees, sqrt
@@ -7,11 +7,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from discreta.sim.arcs import squared_radii, swept
-from discreta.sim.contour import ArcContour, Contour, LineContour
+from discreta.sim.conics import ConicBlock, check_block, curve_near, curve_points
+from discreta.sim.contour import ArcContour, ConicContour, Contour, LineContour
 from discreta.sim.pace import Pace
 from discreta.sim.points import check_arc, check_path
 
-__all__ = ["Arc", "Curve", "Polyline"]
+__all__ = ["Arc", "Conic", "Curve", "Polyline"]
 
 #: Points of a whole circle in a picture, and of the piece of one in a window.
 _ROUND, _NEAR = 1 << 12, 1 << 10
@@ -204,3 +205,54 @@ class Arc:
         phi = np.radians(self._begin + self._sign * angles)
         circle = np.stack([np.cos(phi), np.sin(phi)], axis=1)
         return self.blocks[0, 4:6] + self._radius * circle
+
+
+class Conic:
+    """One piece of a second-order curve, in x and y.
+
+    Parameters
+    ----------
+    made : ConicBlock
+        From one of the functions of :mod:`discreta.sim.conics`, for the width that it is run with
+        or less.
+    """
+
+    kind = "conic"
+    axes = 2
+
+    def __init__(self, made: ConicBlock):
+        self._made = made
+
+    @property
+    def start(self) -> np.ndarray:
+        """Give where it begins."""
+        return self.blocks[0, 5:7]
+
+    @property
+    def blocks(self) -> np.ndarray:
+        """Give the one block."""
+        return np.array([self._made.block], dtype=np.int64)
+
+    def check(self, width: int) -> None:
+        """Raise :class:`BadInputError` for a block that has more bits than the device."""
+        check_block(self._made.block, width)
+
+    def contour(self) -> ConicContour:
+        """Give what compares the steps with the block's own curve."""
+        return ConicContour(self.blocks)
+
+    def facts(self, _contour: Contour, _pace: Pace) -> dict[str, Any]:
+        """Give the kind, how far rounding moved it in steps, and an axis's changes of direction."""
+        return {
+            "curve": self._made.kind,
+            "curve moved": round(self._made.moved, 4),
+            "changes of direction": self._made.block[-1],
+        }
+
+    def outline(self) -> np.ndarray:
+        """Give the block's curve from the start to the end; whole turns once."""
+        return curve_points(self._made.block)
+
+    def near(self, point: np.ndarray, reach: float) -> np.ndarray:
+        """Give the pieces of it near a point, fine however large it is, rows of NaN between."""
+        return curve_near(self._made.block, point, reach)

@@ -16,9 +16,11 @@ __all__ = [
     "MAX_TURNS",
     "BadInputError",
     "check_arc",
+    "check_coordinates",
     "check_line",
     "check_path",
     "check_turns",
+    "give_width",
     "parse_point",
     "read_points",
     "say_point",
@@ -60,7 +62,7 @@ def check_line(start: Sequence[int], end: Sequence[int], width: int) -> None:
         A coordinate or a length is out of range.
     """
     modulus = 1 << width
-    _check_coordinates((start, end), width)
+    check_coordinates((start, end), width)
     length = max(abs(b - a) for a, b in zip(start, end, strict=True))
     if length >= modulus:
         raise BadInputError(
@@ -69,15 +71,24 @@ def check_line(start: Sequence[int], end: Sequence[int], width: int) -> None:
         )
 
 
-def _check_coordinates(points: Iterable[Sequence[int]], width: int) -> None:
-    """Refuse coordinates that ``width`` bits and a sign have no room for."""
+def check_coordinates(points: Iterable[Sequence[int]], width: int, most: int = MAX_WIDTH) -> None:
+    """Refuse coordinates that ``width`` bits and a sign have no room for.
+
+    The message names a width that has, up to ``most``.
+
+    Raises
+    ------
+    BadInputError
+        A coordinate is out of range.
+    """
     modulus = 1 << width
     for point in points:
         for value in point:
             if not -modulus <= value < modulus:
                 raise BadInputError(
                     f"coordinate {_cut(str(value))[1:-1]} is out of range: width {width} has room "
-                    f"for {-modulus} to {modulus - 1}; {_wider(value if value >= 0 else ~value)}"
+                    f"for {-modulus} to {modulus - 1}; "
+                    f"{_wider(value if value >= 0 else ~value, most)}"
                 )
 
 
@@ -133,12 +144,12 @@ def check_arc(
         the circle of its start.
     """
     check_turns(turns)
-    _check_coordinates((start, end, center), width)
+    check_coordinates((start, end, center), width)
     block = np.array([[*start, *end, *center, clockwise, turns - 1]], dtype=np.int64)
     refused = refusals(block, width)[0]
     if refused == RANGE:
         enough = [w for w in range(width, MAX_WIDTH + 1) if refusals(block, w)[0] != RANGE]
-        raise BadInputError(f"{_no_room(start, end, center, block, width)}; {_give_width(enough)}")
+        raise BadInputError(f"{_no_room(start, end, center, block, width)}; {give_width(enough)}")
     if refused == OFF_CURVE:
         raise BadInputError(_off_circle(start, end, center, *squared_radii(block)[0]))
 
@@ -193,14 +204,16 @@ def _places(value: int) -> str:
     return f"{value // 10**4}.{value % 10**4:04d}"
 
 
-def _wider(value: int) -> str:
+def _wider(value: int, most: int = MAX_WIDTH) -> str:
     """Give the cure for a value that needs more bits."""
-    return _give_width(range(value.bit_length(), MAX_WIDTH + 1))
+    return give_width(range(value.bit_length(), most + 1), most)
 
 
-def _give_width(enough: Sequence[int]) -> str:
-    """Give the cure where these widths, the least of them first, would do."""
-    return f"give --width {enough[0]}" if enough else f"no device has more than {MAX_WIDTH} bits"
+def give_width(enough: Sequence[int], most: int = MAX_WIDTH) -> str:
+    """Give the cure where these widths, the least of them first, would do, of those up to most."""
+    if enough:
+        return f"give --width {enough[0]}"
+    return f"no {'device' if most == MAX_WIDTH else 'such device'} has more than {most} bits"
 
 
 def read_points(file: str, width: int) -> np.ndarray:

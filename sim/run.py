@@ -43,11 +43,12 @@ def run(
     Parameters
     ----------
     curve : Curve
-        A :class:`~discreta.sim.curves.Polyline` or an :class:`~discreta.sim.curves.Arc`.
+        A :class:`~discreta.sim.curves.Polyline`, an :class:`~discreta.sim.curves.Arc` or a
+        :class:`~discreta.sim.curves.Conic`.
     method : Method
         One whose blocks are of that kind.
     width : int
-        4 to 32.
+        4 to 32, as far as the method goes.
     engine : str or None
         ``"pysim"`` or ``"compiled"``; None: the compiled engine where it can be used.
     trace, summary_file : str or None

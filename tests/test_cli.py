@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib import metadata
 from itertools import pairwise
-from math import hypot
+from math import cos, hypot, pi, sin
 from pathlib import Path
 
 import click
@@ -26,6 +26,7 @@ from amaranth.lib.wiring import In, Out
 
 from discreta import cli
 from discreta.hdl.circular import Circular
+from discreta.hdl.conic import Conic
 from discreta.hdl.contract import ErrorCode, Part, point_layout, step_layout
 from discreta.hdl.linear import Linear
 from discreta.hdl.quadrant import line_block_layout
@@ -38,6 +39,12 @@ from tests.lines import distance, path_steps
 LINE = ["simulate", "line", "--start", "0,0", "--end", "20,9"]
 ARC = ["simulate", "arc", "--start", "20,0", "--end", "0,20", "--center", "0,0"]
 ARC = [*ARC, "--direction", "ccw"]
+CONIC = ["simulate", "conic"]
+ELLIPSE = [*CONIC, "--ellipse", "1,-2,30,12,30", "--direction", "ccw"]
+CIRCLE = [*CONIC, "--coefficients", "1,0,1,0,0", "--start", "20,0", "--end", "20,0"]
+CIRCLE = [*CIRCLE, "--direction", "ccw"]
+CW = ["--direction", "cw"]
+BEZIER = [*CONIC, "--parabola", "0,20", "--start", "0,0", "--end", "80,40"]
 PYSIM = ["--engine", "pysim"]
 BORDER = Path(__file__).parents[1] / "examples/bulgaria.csv"
 
@@ -355,16 +362,21 @@ def test_a_setting_of_lines(discreta):
 
 
 def test_help_tells_what_every_choice_is_in_every_setting(discreta):
-    for command in (["simulate", "line"], ["simulate", "arc"], ["verilog"]):
+    for command in (["simulate", "line"], ["simulate", "arc"], ["simulate", "conic"], ["verilog"]):
         said = " ".join(discreta(*command, "--help")[1].split())
+        said = re.sub(r"\[[\w|]+\]", "", said)
         for method in METHODS.values():
             for name in method.choices:
-                default, lecture = (method.settings[key][name] for key in ("default", "lecture"))
-                values = (default, lecture)
-                if name == "normalize":
-                    values = ["normalize" if value else "no normalize" for value in values]
-                wanted = rf"--{name}\b[^\]]* \[default: {values[0]}; lecture: {values[1]}\]"
-                assert re.search(wanted, re.sub(r"\[\w+\|\w+\]", "", said))
+                words = re.search(
+                    rf"--{name}\b[^\]]* \[default: ([^;]*); lecture: ([^;]*?)\]", said
+                )
+                assert words
+                for setting, there in zip(("default", "lecture"), words.groups(), strict=True):
+                    value = method.settings[setting][name]
+                    if name == "normalize":
+                        value = "normalize" if value else "no normalize"
+                    # Where the methods differ, of which it is.
+                    assert there == str(value) or f"{value} ({method.name})" in there.split(", ")
 
 
 def test_an_arc_of_no_length(discreta, folder):
@@ -395,7 +407,128 @@ def test_both_engines_draw_an_arc_the_same(discreta, folder):
         assert one == other
 
 
+def test_a_circle_and_a_line_of_the_second_order(discreta):
+    """Every step of a circle as an arc, and of a line as a line, from the documents."""
+    options = ["--width", 8, *PYSIM, "--trace", "-"]
+    # From an axis three changes of direction lie ahead, from between them four.
+    for direction, guard, start, turns in (("ccw", 2, (100, 0), 3), ("cw", 0, (60, 80), 4)):
+        point = "{},{}".format(*start)
+        code, out, err = discreta(
+            *(*CONIC, "--coefficients", "1,0,1,0,0", "--start", point, "--end", point),
+            *("--direction", direction, "--guard", guard, *options),
+        )
+        assert code == 0
+        block = (*start, *start, 0, 0, int(direction == "cw"), 0)
+        steps = [point for _, point in arc_steps(block, width=8, guard=guard)]
+        assert [point for _, point in read_trace(out)[1]] == [start, *steps]
+        said = table(err)
+        errors = [abs(hypot(*point) - 100) for point in steps]
+        assert said["largest error"] == f"{max(errors):.4f}"
+        assert (said["curve"], said["curve moved"]) == ("circle", "0.0000")
+        assert said["changes of direction"] == str(turns)
+    for direction, preload in (("ccw", "half"), ("cw", "zero")):
+        code, out, err = discreta(
+            *(*CONIC, "--coefficients", "0,0,0,99/200,-1", "--start", "0,0", "--end", "200,99"),
+            *("--direction", direction, "--guard", 0, "--preload", preload, *options),
+        )
+        assert code == 0
+        steps = path_steps([(0, 0), (200, 99)], width=8, preload=preload)
+        points = [point for _, point in read_trace(out)[1]]
+        assert points == [(0, 0), *(point for _, point in steps)]
+        assert table(err)["curve"] == "line"
+
+
+# Options, kind, end, and points of the curve: x and y by a parameter from 0 to 1.
+CONICS = {
+    **{
+        f"ellipse {direction}": (
+            [*ELLIPSE[:-1], direction],
+            "ellipse",
+            (27, 13),
+            lambda t, side=side: turned(30 * cos(2 * pi * t), side * 12 * sin(2 * pi * t)),
+        )
+        for direction, side in (("ccw", 1), ("cw", -1))
+    },
+    "part of it, in its third turn": (
+        [*ELLIPSE, "--angles", "90,180", "--turns", "3"],
+        "ellipse",
+        (-25, -17),
+        lambda t: turned(-30 * sin(4.5 * pi * t), 12 * cos(4.5 * pi * t)),
+    ),
+    "parabola": (BEZIER, "parabola", (80, 40), lambda t: (80 * t * t, 40 * t)),
+    "hyperbola": (
+        [*CIRCLE, "--coefficients", "0,1e-1,0,0,0", "--start", "80,5", "--end", "5,80", *CW],
+        "hyperbola",
+        (5, 80),
+        lambda t: (80 / 16**t, 5 * 16**t),
+    ),
+}
+
+
+def turned(u, v):
+    """Turn by 30 degrees, around 1,-2."""
+    return 1 + cos(pi / 6) * u - v / 2, -2 + u / 2 + cos(pi / 6) * v
+
+
+@pytest.mark.parametrize(("words", "kind", "end", "place"), CONICS.values(), ids=CONICS)
+def test_conics(discreta, words, kind, end, place):
+    """Along the curve from its start to its end, near it all the way, every step to a neighbour."""
+    code, out, err = discreta(*words, "--width", 8, *PYSIM, "--trace", "-")
+    assert code == 0
+    said = table(err)
+    assert (said["curve"], said["end point reached"]) == (kind, "yes")
+    points = [point for _, point in read_trace(out)[1]]
+    assert points[-1] == end
+    assert all(max(abs(u - x), abs(v - y)) == 1 for (x, y), (u, v) in pairwise(points))
+    curve = [place(k / 6000) for k in range(6001)]
+    off = float(said["curve moved"]) + 1.5
+    assert hypot(points[0][0] - curve[0][0], points[0][1] - curve[0][1]) <= 0.75
+    # Both are gone along together: of the curve's points each is near, one after the other.
+    here = 0
+    for x, y in curve:
+        ahead = range(here, min(here + 12, len(points)))
+        here = min(ahead, key=lambda k: hypot(points[k][0] - x, points[k][1] - y))
+        assert hypot(points[here][0] - x, points[here][1] - y) < off
+    assert here > len(points) - 3
+    largest = max(
+        min(hypot(x - u, y - v) for u, v in curve[:: 1 + 2 * (kind == "ellipse")])
+        for x, y in points
+    )
+    assert float(said["largest error"]) == pytest.approx(largest, abs=0.1 + off - 1.5)
+
+
+@pytest.mark.usefixtures("compiled_engine")
+def test_both_engines_draw_a_conic_the_same(discreta, folder):
+    said = {}
+    for engine in ("pysim", "compiled"):
+        files = ["--trace", f"{engine}.csv", "--plot", f"{engine}.png", "--json", "-"]
+        options = ["--width", 6, "--setting", "lecture", "--engine", engine]
+        code, out, _ = discreta(*BEZIER[:-1], "45,30", *options, *files)
+        assert code == 0
+        said[engine] = json.loads(out)
+        assert said[engine].pop("engine") == engine
+    assert said["pysim"] == said["compiled"]
+    for kind in ("csv", "png"):
+        one, other = ((folder / f"{engine}.{kind}").read_bytes() for engine in said)
+        assert one == other
+
+
 # --- what it writes
+
+
+def test_the_summary_and_the_waveform_of_a_conic(discreta, folder):
+    code, out, _ = discreta(*CIRCLE, "--width", 5, "--json", "-", "--vcd", "w.vcd")
+    assert code == 0
+    keys = ["method", "width", "order", "preload", "guard", "engine", "clocks"]
+    keys += ["summations", "steps", "clocks per step", "largest error", "largest error at"]
+    keys += ["curve", "curve moved", "changes of direction", "end point reached"]
+    assert list(json.loads(out)) == keys
+    view = (folder / "w.gtkw").read_text()
+    core = Conic(5)
+    Fragment.get(core, None)  # else Amaranth complains that it is not used
+    shown = set(re.findall(r"^\+\{\w+\}", view, re.M))
+    assert {f"+{{{name}}}" for name in core.registers} <= shown
+    assert {"+{position_x}", "+{position_y}"} <= shown
 
 
 def test_only_data_on_the_standard_output(discreta):
@@ -507,15 +640,18 @@ def test_survey(discreta):
     ]
     lengths = [(x, y) for x in range(16) for y in range(16)]
     for row in rows:
-        variant, largest, line, _, _, missed = re.split(r"  +", row.strip())
+        variant, largest, usual, line, _, _, missed = re.split(r"  +", row.strip())
         preload = variant.split()[-1]
         options = {"width": 4, "normalize": not variant.startswith("no "), "preload": preload}
-        errors = [
-            distance(point, (0, 0), length)
-            for length in lengths
-            for _, point in path_steps([(0, 0), length], **options)
-        ]
-        assert largest == f"{max(errors):.4f}"
+        errors = sorted(
+            max((distance(point, (0, 0), length) for _, point in steps), default=0)
+            for length, steps in (
+                (length, path_steps([(0, 0), length], **options)) for length in lengths
+            )
+        )
+        assert largest == f"{errors[-1]:.4f}"
+        # 0.999 of the 255 from the first to the last.
+        assert usual == f"{errors[-2] + 0.745 * (errors[-1] - errors[-2]):.4f}"
         assert max(map(abs, map(int, line.split(",")))) < 16
         assert missed == "0"
     assert re.fullmatch(r"\d+ clocks of RTL in \d+\.\d s, \d+\.\d million a second", time_taken)
@@ -637,11 +773,13 @@ BAD = {
     # Methods and their options
     "method": (
         [*LINE, "--method", "circle"],
-        "Invalid value for '--method': there is no method 'circle': choose linear or circular",
+        "Invalid value for '--method': there is no method 'circle': choose linear or circular or "
+        "conic",
     ),
     "prove": (
         ["prove", "linear", "circle"],
-        "Invalid value for 'METHOD...': there is no method 'circle': choose linear or circular",
+        "Invalid value for 'METHOD...': there is no method 'circle': choose linear or circular or "
+        "conic",
     ),
     "width 3": ([*LINE, "--width", "3"], f"Invalid value for '--width': width is 3: {WIDTH}"),
     "width 33": ([*LINE, "--width", "33"], f"Invalid value for '--width': width is 33: {WIDTH}"),
@@ -739,6 +877,120 @@ BAD = {
         [*ARC, "--center", "20,0"],
         "the start 20,0 is the center and the end 0,20 is not: an arc needs a radius; give another "
         "center",
+    ),
+    # Conics
+    "no conic": (
+        CONIC,
+        "no curve given: choose one of --coefficients, --ellipse, --parabola",
+    ),
+    "two conics": (
+        [*BEZIER, "--coefficients", "1,0,1,0,0"],
+        "--coefficients and --parabola given: choose one of --coefficients, --ellipse, --parabola",
+    ),
+    "conic without an end": (CIRCLE[:6], "--coefficients needs --end too: give it"),
+    "conic without a direction": (CIRCLE[:8], "--coefficients needs --direction too: give it"),
+    "ellipse without a direction": (ELLIPSE[:4], "--ellipse needs --direction too: give it"),
+    "parabola with a direction": (
+        [*BEZIER, "--direction", "cw"],
+        "--direction does not go with --parabola: leave it out",
+    ),
+    "parabola with turns": (
+        [*BEZIER, "--turns", "1"],
+        "--turns does not go with --parabola: leave it out",
+    ),
+    "ellipse with a start": (
+        [*ELLIPSE, "--start", "0,0"],
+        "--start does not go with --ellipse: leave it out",
+    ),
+    "circle with angles": (
+        [*CIRCLE, "--angles", "0,90"],
+        "--angles does not go with --coefficients: leave it out",
+    ),
+    **{
+        f"coefficients {words}": (
+            [*CIRCLE, "--coefficients", words],
+            f"Invalid value for '--coefficients': '{words}' is not A,B,C,D,E: give 5 numbers with "
+            "commas between, like 1,0,1,0,0",
+        )
+        for words in ("1,0,1,0", "1,0,x,0,0", "1,0,1/0,0,0", "1,0,nan,0,0", "1e999,0,1,0,0", "")
+    },
+    "ellipse between the steps": (
+        [*ELLIPSE, "--ellipse", "0,0.5,30,12,30"],
+        "the center 0,0.5 of --ellipse is between the steps: give whole numbers",
+    ),
+    "ellipse too short": (
+        [*ELLIPSE, "--ellipse", "0,0,30,1.5,30"],
+        "the semi-axis 1.5 is too short: give 2 or more",
+    ),
+    "too sharp": (
+        [*CIRCLE, "--start", "1,1", "--end", "1,1"],
+        "the curve is too sharp at its start 1,1: |Gx| + |Gy| is 2.00 times |A| + |B| + |C|, where "
+        "4 times is needed; start at a flatter place or make the curve larger",
+    ),
+    "degenerate": (
+        [*CIRCLE, "--coefficients", "0,1,0,0,0"],
+        "the curve through 20,0 is a pair of straight lines, where a curve is needed: give a line "
+        "by its own D and E, with A, B and C = 0",
+    ),
+    "no direction": (
+        [*CIRCLE, "--start", "0,0"],
+        "the curve has no direction at its start 0,0, where both derivatives are 0: start at "
+        "another point",
+    ),
+    "other branch": (
+        [*CIRCLE, "--coefficients", "0,1,0,0,0", "--start", "20,20", "--end", "-20,-20"],
+        "the end -20,-20 is on the other branch of the hyperbola: end on the branch of the start "
+        "20,20",
+    ),
+    "off the conic": (
+        [*CIRCLE, "--end", "0,22"],
+        "the end 0,22 is 2.00 steps off the curve, where at most 1 is allowed: end at a point such "
+        "as 0,20",
+    ),
+    "turns of a parabola": (
+        [*BEZIER[:2], *BEZIER[4:], "--coefficients", "0,0,1,-20,0", *CW, "--turns", "2"],
+        "a parabola does not come back to its start: leave the turns out",
+    ),
+    "conic too far": ([*CIRCLE, "--end", "70000,0"], f"coordinate 70000 {ROOM} 17"),
+    "conic too far for all": (
+        [*CIRCLE, "--end", "17000000,0"],
+        "coordinate 17000000 is out of range: width 16 has room for -65536 to 65535; no such "
+        "device has more than 24 bits",
+    ),
+    "conic too large": (
+        [*CIRCLE, "--start", "50000,50000", "--end", "50000,50000"],
+        "the curve goes as far as x = 70710.7, where width 16 has room for -65535 to 65534 between "
+        "start and end; give --width 17 or a shorter arc",
+    ),
+    "conic too large for all": (
+        [*CIRCLE, "--width", "24", "--start", "16000000,16000000", "--end", "16000000,16000000"],
+        "the curve goes as far as x = 22627417.0, where width 24 has room for -16777215 to "
+        "16777214 between start and end; give a shorter arc",
+    ),
+    "width of conics": (
+        [*CIRCLE, "--width", "25"],
+        "Invalid value for '--width': width is 25: choose a whole number from 4 to 24",
+    ),
+    "width of a method": (
+        ["verilog", "conic", "--width", "25"],
+        "--width 25: conic has up to 24 bits: choose 4 to 24",
+    ),
+    "width of a proof": (
+        ["prove", "linear", "conic", "--width", "32"],
+        "--width 32: conic has up to 24 bits: choose 4 to 24",
+    ),
+    "conic with a method for arcs": (
+        [*CIRCLE, "--method", "circular"],
+        "method circular draws arcs and no conics: choose conic",
+    ),
+    "normalize of conics": (
+        [*CIRCLE, "--no-normalize"],
+        "--normalize is no option of conic, which has --order and --preload and --guard: leave it "
+        "out",
+    ),
+    "order of arcs": (
+        [*ARC, "--order", "implicit"],
+        "--order implicit: choose alternated or simultaneous for circular",
     ),
     # Points
     "one axis": (

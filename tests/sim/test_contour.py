@@ -7,9 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from discreta.hdl.circular import Circular
+from discreta.hdl.conic import Conic
 from discreta.sim.arcs import is_empty, refusals
+from discreta.sim.conics import KINDS, random_blocks
 from discreta.sim.contour import (
     ArcContour,
+    ConicContour,
     LineContour,
     distance_from_circle,
     distance_from_line,
@@ -268,3 +271,79 @@ def test_thousands_of_arcs_in_one_run(stalls):
     assert np.all(contour.block_clocks > 0)
     last = np.flatnonzero(contour.block_steps)[-1]
     assert contour.block_clocks[: last + 1].sum() == contour.clocks
+
+
+# A block, points, and how far they are from its curve, all known without a formula.
+CONICS = {
+    "circle": ([1, 0, 1, 0, 0, 0, 13, 13, 0, 1, 0], [(3, 4), (-5, -12), (12, 16)], [8, 0, 7]),
+    "line": ([0, 0, 0, 3, 4, 0, 0, 8, -6, 0, 0], [(3, 4), (4, -3), (-3, 6)], [5, 0, 3]),
+    # 9x² + 25y² = 225 at the ends of its axes.
+    "ellipse": ([9, 0, 25, 0, 0, 5, 0, 0, 3, 0, 0], [(6, 0), (0, -2), (4, 0)], [1, 1, 1]),
+    # x² = 8y, with the focus at 0,2: from there the vertex is nearest.
+    "parabola": ([1, 0, 0, 0, -8, 0, 0, 8, 8, 0, 0], [(0, 1), (0, -4), (8, 8)], [1, 4, 0]),
+    "hyperbola": ([0, -1, 0, 0, 0, 9, 4, 4, 9, 1, 0], [(5, 5), (-7, -7), (36, 1)], [2**0.5] * 2),
+}
+CONICS["hyperbola"][2].append(0)
+
+
+def test_distances_from_conics_known_without_a_formula():
+    """All of them in one run, mixed."""
+    contour = ConicContour(np.array([block for block, _, _ in CONICS.values()]))
+    which = np.repeat(np.arange(len(CONICS)), 3)[::-1]
+    points = np.array([points for _, points, _ in CONICS.values()]).reshape(-1, 2)[::-1]
+    wanted = np.array([off for _, _, off in CONICS.values()]).ravel()[::-1]
+    assert contour.errors(points, which) == pytest.approx(wanted, abs=1e-9)
+    # However many points there are at a time.
+    for times in (5_000, 3_000):
+        many = contour.errors(np.tile(points, (times, 1)), np.tile(which, times))
+        assert many == pytest.approx(np.tile(wanted, times), abs=1e-9)
+
+
+@pytest.mark.usefixtures("compiled_engine")
+@pytest.mark.parametrize("stalls", [NO_STALLS, Stalls(3, stall=0.4, gap=0.5)])
+def test_hundreds_of_conics_in_one_run(stalls):
+    """Of every kind, with blocks of no length and some that are refused between them."""
+    blocks = np.concatenate(
+        [random_blocks(kind, 6, 80, np.random.default_rng(4)) for kind in KINDS]
+    )
+    np.random.default_rng(4).shuffle(blocks)
+    blocks[::9, 7:11] = blocks[::9, [5, 6, 9, 10]]
+    blocks[::9, 10] = 0
+    refused = np.arange(len(blocks)) % 11 == 5
+    blocks[refused, :5], blocks[refused, 10] = 0, 1  # no direction anywhere
+    empty = (np.arange(len(blocks)) % 9 == 0) & ~refused
+    contour = ConicContour(blocks)
+    seen = []
+    core = Conic(6, **Conic.LECTURE)
+    for stretch in simulate(core, blocks, limit=10**6, engine="compiled", stalls=stalls):
+        seen.append(contour.follow(stretch))
+    _, points, errors = (np.concatenate(parts) for parts in zip(*seen, strict=True))
+    np.testing.assert_array_equal(contour.reached, ~refused)
+    np.testing.assert_array_equal(contour.block_steps == 0, refused | empty)
+    assert contour.largest_error == errors.max()
+
+    cuts = np.cumsum(contour.block_steps)[:-1]
+    judged = 0
+    for block, path, off, largest in zip(
+        blocks.tolist(),
+        np.split(points, cuts),
+        np.split(errors, cuts),
+        contour.block_errors,
+        strict=True,
+    ):
+        assert largest == off.max(initial=0)
+        if not len(path):
+            continue
+        a, b, c, d, e, x, y, *_ = block
+        # The distance is between these two: of first order, and where the curve is met for sure.
+        u, v = path.T
+        value = a * (u * u - x * x) + b * (u * v - x * y) + c * (v * v - y * y)
+        value += d * (u - x) + e * (v - y)
+        steep = np.hypot(2 * a * u + b * v + d, b * u + 2 * c * v + e)
+        second = abs(a + c) + np.hypot(a - c, b)
+        np.testing.assert_array_less(np.abs(value), off * (steep + second * off / 2) + 1e-6)
+        good = off * second < steep / 4
+        judged += np.count_nonzero(good)
+        bend = off * steep - second * off**2 / 2 * (1 + 1e-9)
+        np.testing.assert_array_less(bend[good], np.abs(value)[good] + 1e-6 * steep[good])
+    assert judged > 0.8 * len(points)

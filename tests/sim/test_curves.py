@@ -3,8 +3,9 @@ from math import cos, hypot, radians, sin
 import numpy as np
 import pytest
 
-from discreta.sim.contour import ArcContour, LineContour
-from discreta.sim.curves import Arc, Polyline
+from discreta.sim.conics import ellipse, from_coefficients, parabola
+from discreta.sim.contour import ArcContour, ConicContour, LineContour
+from discreta.sim.curves import Arc, Conic, Polyline
 from discreta.sim.pace import Pace
 from discreta.sim.points import BadInputError
 
@@ -128,3 +129,77 @@ def test_a_polyline_as_blocks():
     }
     with pytest.raises(BadInputError, match=r"^the line from 15,0 to -1,0 is 16 steps long"):
         Polyline([(-1, 0), (0, 0), (15, 0), (-1, 0)]).check(4)
+
+
+def test_a_conic_as_a_block():
+    """The upper half of y² = 200x from its vertex, by hand."""
+    conic = Conic(parabola((0, 0), (0, 200), (800, 400), 16))
+    assert conic.blocks.tolist() == [[0, 0, 1, -200, 0, 0, 0, 800, 400, 1, 0]]
+    assert conic.blocks.dtype == np.int64
+    assert conic.start.tolist() == [0, 0]
+    assert (conic.kind, conic.axes) == ("conic", 2)
+    assert isinstance(conic.contour(), ConicContour)
+    facts = {"curve": "parabola", "curve moved": 0.0, "changes of direction": 0}
+    assert conic.facts(conic.contour(), Pace()) == facts
+    outline = conic.outline()
+    assert outline[[0, -1]] == pytest.approx(np.array([[0, 0], [800, 400]]))
+    assert outline[:, 1] ** 2 == pytest.approx(200 * outline[:, 0], abs=1e-6)
+    assert np.all(np.diff(outline, axis=0) > 0)
+
+
+@pytest.mark.parametrize(
+    ("width", "message"),
+    [
+        (15, None),
+        (12, "coordinate 5000 is out of range: width 12 has room for -4096 to 4095; give .* 13$"),
+        (3, "^width is 3: choose a whole number from 4 to 24$"),
+        (25, "^width is 25: choose a whole number from 4 to 24$"),
+    ],
+)
+def test_a_conic_is_for_devices_as_wide_as_its_numbers(width, message):
+    conic = Conic(from_coefficients([3, 0, 3, 0, 0], (5000, 0), (0, 5000), False, 16))
+    if message is None:
+        conic.check(width)
+        return
+    with pytest.raises(BadInputError, match=message):
+        conic.check(width)
+
+
+def test_coefficients_that_a_device_has_no_bits_for():
+    conic = Conic(from_coefficients([4095, 0, 4095, 0, 0], (90, 0), (90, 0), False, 16))
+    conic.check(9)
+    room = "width 8 has room for 2047 and 1048575; give --width 9"
+    with pytest.raises(BadInputError, match=f"^the coefficients 4095,0,4095,0,0 are .*: {room}$"):
+        conic.check(8)
+
+
+def test_a_conic_near_a_point_of_it():
+    """A hyperbola whose outline is not fine enough: xy = 10^10, in a window."""
+    conic = Conic(from_coefficients([0, 1, 0, 0, 0], (10**6, 10**4), (10**4, 10**6), True, 20))
+    assert np.hypot(*np.diff(conic.outline(), axis=0).T).max() > 100
+    for x in (10**6, 123_456.5, 10**5, 10**4):
+        point = np.array([x, 1e10 / x])
+        near = conic.near(point, 14)
+        assert near[:, 0] * near[:, 1] == pytest.approx(1e10, rel=1e-12)
+        assert np.hypot(*np.diff(near, axis=0).T).max() <= 0.1
+        ends = np.hypot(*(near[[0, -1]] - point).T)
+        # Out of reach on both sides, or at an end of the curve.
+        assert ends == pytest.approx([0 if x == 10**6 else 14, 0 if x == 10**4 else 14], abs=0.2)
+
+
+def test_both_sides_of_a_flat_ellipse_are_near():
+    """A semi-axis of 7 steps: what comes back on the other side is another piece."""
+    conic = Conic(ellipse((0, 0), (20, 7), 0, 8, start_angle=90, end_angle=90))
+    near = conic.near(np.array([0, 7]), 16)
+    gaps = np.flatnonzero(np.isnan(near[:, 0]))
+    pieces = np.split(near, gaps)
+    pieces = [pieces[0], *(piece[1:] for piece in pieces[1:])]
+    # It begins and ends there, and passes below.
+    assert len(pieces) == 3
+    for piece, side in zip(pieces, (1, -1, 1), strict=True):
+        assert (piece[:, 0] / 20) ** 2 + (piece[:, 1] / 7) ** 2 == pytest.approx(1)
+        assert np.all(piece[:, 1] * side > 3)
+    assert pieces[1][0, 0] < -4 < 4 < pieces[1][-1, 0]
+    assert pieces[0][0] == pytest.approx([0, 7])
+    assert pieces[2][-1] == pytest.approx([0, 7])
+    assert conic.near(np.array([0, 40]), 11).shape == (0, 2)

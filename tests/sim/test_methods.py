@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from amaranth.hdl import Fragment
 
-from discreta.sim.contour import ArcContour, LineContour
+from discreta.sim.conics import KINDS, ellipse, random_blocks
+from discreta.sim.contour import ArcContour, ConicContour, LineContour
 from discreta.sim.methods import METHODS
 from discreta.sim.simulate import simulate
 
@@ -74,20 +75,40 @@ def blocks_of_arcs(count, width):
     return np.column_stack([start, end, 0 * start, direction, turns])
 
 
+def blocks_of_conics(count, width):
+    """Draw as many of every kind, and circles and turned ellipses of several turns."""
+    random = np.random.default_rng(3)
+    drawn = [random_blocks(kind, width, count, random) for kind in KINDS]
+    around = [
+        ellipse((1, -1), axes, 33, width, end_angle=end, full_turns=turns).block
+        for axes in ((4, 4), (19, 11), (40, 17))
+        for end, turns in ((0, 9), (100, 2))
+    ]
+    return np.concatenate([*drawn, around])
+
+
+CONTOURS = {"line": LineContour, "arc": ArcContour, "conic": ConicContour}
+
+
 @pytest.mark.usefixtures("compiled_engine")
 @pytest.mark.parametrize("setting", ["default", "lecture"])
 @pytest.mark.parametrize(
     ("name", "blocks"),
-    [("linear", blocks_of_lines(100, 6)), ("circular", blocks_of_arcs(60, 6))],
+    [
+        ("linear", blocks_of_lines(100, 6)),
+        ("circular", blocks_of_arcs(60, 6)),
+        ("conic", blocks_of_conics(150, 6)),
+    ],
+    ids=METHODS,
 )
 def test_no_block_takes_more_clocks_than_it_may(name, blocks, setting):
     """And the limit is no more than a few times too high: a dead core is soon given up."""
     method = METHODS[name]
     choices = method.settings[setting]
     most = method.clocks(method.model(6, **choices), blocks)
-    contour = (LineContour if method.curve == "line" else ArcContour)(blocks)
+    contour = CONTOURS[method.curve](blocks)
     core = method.core(6, **choices)
-    for stretch in simulate(core, blocks, limit=int(most.sum()), engine="compiled"):
+    for stretch in simulate(core, blocks, limit=int(most.sum()) + 2, engine="compiled"):
         contour.follow(stretch)
     # Back to back a block begins, at the earliest, with the last step of the one before.
     assert np.all(contour.block_clocks <= most)
@@ -102,3 +123,14 @@ def test_clocks_of_lines_are_the_power_of_two_above_the_longest_axis():
     assert (normalized - normalized[0]).tolist() == [0, 2, 8, 16, 256]
     plain = LINEAR.clocks(LINEAR.model(8, normalize=False), blocks)
     assert (plain - plain[0]).tolist() == [0, 256, 256, 256, 256]
+
+
+def test_clocks_of_a_conic_whose_last_axis_hardly_moves():
+    """x ends beside the highest point: y' = Gx is then 1, where a step in x changes it by 2^16."""
+    method = METHODS["conic"]
+    block = [2**15, 0, 2**15, 1 - 2**16 * 700, 0, 1400, 0, 700, 700, 0, 0]
+    golden = method.model(12, order="implicit", preload="half", guard=0)
+    flat, far = np.array([block]), np.array([[*block[:7], 0, 0, *block[9:]]])
+    # A step of y takes 2^16 summations there, and twice as many if they are least in a doubling.
+    assert 2**16 < method.clocks(golden, flat)[0] < 2**21
+    assert method.clocks(golden, far)[0] < 2**14
