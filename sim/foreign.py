@@ -34,9 +34,13 @@ LINT_WAIVERS = (
     # Yosys writes "no bit is set" as !value for values of several bits.
     ("WIDTHTRUNC", r"Logical operator LOGNOT expects 1 bit on the LHS"),
     # Yosys writes operands with no more bits than they need; the standard widens them.
-    ("WIDTHEXPAND", r"Operator [A-Z]+ expects \d+ bits on the RHS"),
+    ("WIDTHEXPAND", r"Operator [A-Z]+ expects \d+ bits on the [LR]HS"),
     # Yosys leaves a bit that is always the same in a wire of its own, though no one reads it.
     ("UNUSEDSIGNAL", r"Bits of signal are not used: '_\d+_'"),
+    # Whether an axis of a conic steps is asked of one bit of a step, which way of the other.
+    ("UNUSEDSIGNAL", r"Bits of signal are not used: '(move_[xy]|step(_2)?)'\[\d\]"),
+    # Not every order of a conic needs all that is scaled, nor all bits of a total.
+    ("UNUSEDSIGNAL", r"Bits of signal are not used: '(normalized|total)'\["),
     # The lowest bit of ⌊2R⌋ is for the radius meter alone.
     ("UNUSEDSIGNAL", r"Bits of signal are not used: 'root'\[0\]"),
 )

@@ -11,14 +11,14 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from itertools import repeat
-from math import pi, sqrt
+from math import log, pi, sqrt
 from typing import Any, Protocol
 
 import numpy as np
 
 from discreta.sim.arcs import seen_from_center
 from discreta.sim.compiled import CompiledModel
-from discreta.sim.contour import ArcContour, Contour, LineContour
+from discreta.sim.contour import ArcContour, ConicContour, Contour, LineContour
 from discreta.sim.groups import SEED, Group
 from discreta.sim.methods import METHODS, Method
 from discreta.sim.points import say_point
@@ -60,13 +60,15 @@ class SurveyRow:
     ends_missed : int
         Blocks that were not done on their end point, or not refused as they had to be.
     completed : int
-        Arcs that took completing steps.
+        Arcs and conics that took completing steps.
     summations : int
         Clocks in which the device ran.
     length : float
         Steps of the axis that moves faster, of all blocks.
     findings : list of str
         Where RTL and golden model differ or why the device was given up, the first of every part.
+    block_errors : array of float
+        The largest error of every block that was not to be refused, in any order.
     """
 
     variant: dict[str, Any]
@@ -82,6 +84,12 @@ class SurveyRow:
     summations: int = 0
     length: float = 0.0
     findings: list[str] = field(default_factory=list)
+    block_errors: np.ndarray = field(default_factory=lambda: np.empty(0), repr=False, compare=False)
+
+    @property
+    def usual_error(self) -> float:
+        """The 99.9-percentile of the blocks' largest errors, in steps; 0 without blocks."""
+        return float(np.quantile(self.block_errors, 0.999)) if len(self.block_errors) else 0.0
 
     @property
     def good(self) -> bool:
@@ -99,6 +107,7 @@ class SurveyRow:
             *("length", "findings"),
         ):
             setattr(self, name, getattr(self, name) + getattr(other, name))
+        self.block_errors = np.concatenate([self.block_errors, other.block_errors])
 
 
 class _Curve(Protocol):
@@ -187,14 +196,54 @@ class _Arcs:
         return arc, say_point(point)
 
 
-_CURVES: dict[str, _Curve] = {"line": _Lines(), "arc": _Arcs()}
+class _Conics:
+    """Curves of the second order."""
+
+    fields: tuple[str, ...] = (*"abcde", *_Lines.fields, "clockwise", "turns")
+    watch: tuple[str, ...] = (
+        *("running", "turns", "gx", "gy", "p3", "p4", "clockwise"),
+        *("backward_x", "backward_y", "direction_x", "direction_y"),
+    )
+
+    def contour(self, blocks: np.ndarray) -> ConicContour:
+        """Compare with the curves."""
+        return ConicContour(blocks)
+
+    def clocks(self, method: Method, golden: Any, group: Group) -> np.ndarray:  # noqa: ARG002
+        """Give 2^guard / ln 2 for every step of the faster axis, and the preparation.
+
+        A summation moves it by 2^−guard times ½ to 1, by the logarithm all of these alike.
+        """
+        return (group.lengths * 2**golden.guard / log(2)).astype(np.int64) + golden.width + 7
+
+    def completing(self, seen: dict[str, np.ndarray]) -> np.ndarray:
+        """Tell the clocks in which nothing that has steps left would move."""
+        clockwise = seen["clockwise"] == 1
+        moves = np.zeros(len(clockwise), dtype=bool)
+        for k, g, count, way in (("x", "gy", "p3", -1), ("y", "gx", "p4", 1)):
+            velocity = np.where(clockwise, -way, way) * np.sign(seen[g])
+            ahead = np.where(seen[f"direction_{k}"] == 1, -1, 1)
+            able = (velocity == ahead) & (seen[f"backward_{k}"] == 0)
+            moves |= able & (seen[count] != 0)
+        return (seen["running"] == 1) & (seen["turns"] == 0) & ~moves
+
+    def say(self, block: np.ndarray, point: np.ndarray) -> tuple[str, str]:
+        """Write coefficients, start and end with what is not usual of the curve, and the point."""
+        five, start, end = block[:5], block[5:7], block[7:9]
+        curve = f"{say_point(five)} from {say_point(start)} to {say_point(end)}"
+        turns = f", {-(-block[10] // 4)} turns" if block[10] > 4 else ""
+        return f"{curve}{' cw' if block[9] else ''}{turns}", say_point(point)
+
+
+_CURVES: dict[str, _Curve] = {"line": _Lines(), "arc": _Arcs(), "conic": _Conics()}
 
 
 def say_worst(method: Method, group: Group, row: SurveyRow) -> tuple[str, str]:
     """Write the block with the largest error, and the point, as a table has them.
 
     A line is written as its lengths with their signs, and the point as seen from its start; an arc
-    as start and end, with ``about`` its center if that is not the origin, and ``cw``.
+    as start and end, with ``about`` its center if that is not the origin, and ``cw``; a conic as
+    its coefficients, start and end, ``cw`` and in how many turns it ends if that is not one.
     """
     return _CURVES[method.curve].say(group.blocks[row.error_index], np.array(row.error_at))
 
@@ -308,6 +357,7 @@ def _survey_part(part: _Part) -> SurveyRow:
         summations=judge.summations,
         length=float(group.lengths[part.chosen].sum()),
         findings=judge.findings,
+        block_errors=contour.block_errors[answers == 0],
     )
 
 

@@ -10,13 +10,15 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from amaranth import Module, Mux, Signal
+from amaranth import Cat, Module, Mux, Signal
 from amaranth.hdl import Value
 
 from discreta.hdl.circular import Circular
+from discreta.hdl.conic import Conic
 from discreta.hdl.contract import ErrorCode, Part
 from discreta.hdl.linear import Linear
 from discreta.sim.golden.circular import Circular as GoldenCircular
+from discreta.sim.golden.conic import Conic as GoldenConic
 from discreta.sim.golden.linear import Linear as GoldenLinear
 from discreta.sim.golden.logic import equal, where
 from discreta.sim.methods import METHODS, Method
@@ -86,6 +88,13 @@ SOUND = [
         "nothing: as in the lecture's block diagram",
         options=METHODS["circular"].settings["lecture"],
     ),
+    Variant(METHODS["conic"], "sound conic", "nothing: the default setting"),
+    Variant(
+        METHODS["conic"],
+        "sound conic, lecture",
+        "nothing: summed as in the lecture's block diagram",
+        options=METHODS["conic"].settings["lecture"],
+    ),
 ]
 VARIANTS: list[Variant] = []
 
@@ -107,6 +116,7 @@ def _variant(
 
 
 _line, _arc = partial(_variant, "linear"), partial(_variant, "circular")
+_conic = partial(_variant, "conic")
 
 
 def _amend(part: Part, change: Callable[[Module], None]) -> None:
@@ -486,3 +496,150 @@ def rim_misread(core: Circular) -> None:
             m.d.sync += inp.fault_register.eq(ErrorCode.RANGE)
 
     _amend(inp, change)
+
+
+# Curves of the second order. Broken sums, derivatives and pieces: whoever looks at some sees it.
+
+
+def _sums(core: Conic) -> Value:
+    """Tell a clock in which a carry or a borrow would be a step."""
+    return core.adders[0].enable | core.adders[1].enable
+
+
+@_conic({*ALL})
+def borrow_not_a_step(core: Conic) -> None:
+    """A borrow is put back into its sum like any other, but steps upwards."""
+    for adder in core.adders:
+        _assign(adder, adder.step[1], 0)
+
+
+@_conic({*ALL})
+def b_forgotten(core: Conic) -> None:
+    """A step of y does not change GX."""
+    converter = core.converter["x"]
+    _assign(core, converter.y_step, 0)
+
+
+@_conic({*ALL})
+def turns_not_counted(core: Conic) -> None:
+    """A change of direction leaves ``turns`` as it is: the last piece is never entered."""
+
+    def change(m: Module) -> None:
+        with m.If(core.output.load & ~core.uu.load):
+            m.d.sync += core.turns.eq(core.turns)
+
+    _amend(core, change)
+
+
+@_conic({*ALL})
+def half_increment_on_the_wrong_axis(core: Conic) -> None:
+    """The first increment is halved of the axis that is added to second."""
+    first, second = core.adders
+    bent = Cat(core.coefficients[k] for k in "abc").any()
+
+    def change(m: Module) -> None:
+        with m.If(core.fresh & bent):
+            m.d.comb += [first.change.eq(0), second.change.eq(-(second.velocity >> 1))]
+
+    _amend(core, change)
+
+
+@_conic({*ALL})
+def still_axis_holds_up(core: Conic) -> None:
+    """The derivative of an axis that does not go is not left out of the scale."""
+
+    def change(m: Module) -> None:
+        increments = core.normalizer.increments
+        m.d.comb += [increments.x.eq(core.gx), increments.y.eq(core.gy)]
+
+    _amend(core, change)
+
+
+@_conic({*ALL})
+def completing_steps_missing(core: Conic) -> None:
+    """What is left when there can be no more carries and borrows is never put out."""
+
+    def change(m: Module) -> None:
+        with m.If(core.uu.clock & (core.turns == 0) & ~_sums(core)):
+            m.d.comb += [core.p3.count.eq(0), core.p4.count.eq(0), core.uu.ending.eq(0)]
+            m.d.comb += [core.output.carry.x.eq(0), core.output.carry.y.eq(0)]
+            m.d.comb += [converter.move.eq(0) for converter in core.converter.values()]
+            m.d.sync += [core.p1.eq(core.p1), core.p2.eq(core.p2)]
+
+    _amend(core, change)
+
+
+@_conic({*ALL})
+def own_change_forgotten(core: Conic) -> None:
+    """A step of the second axis adds nothing to its sum, as in order alternated."""
+    _assign(core, core.adders[1].own, 0)
+
+
+@_conic({*ALL}, **METHODS["conic"].settings["lecture"])
+def falling_sum_not_complemented(core: Conic) -> None:
+    """The sum of an axis that falls starts from 0 too."""
+
+    def change(m: Module) -> None:
+        with m.If(core.uu.load):
+            m.d.sync += [core.sx.eq(0), core.sy.eq(0)]
+
+    _amend(core, change)
+
+
+# The steps are right, the coordinates are not: the documents judge the steps alone.
+@_conic({*ALL} - {DOCUMENTS})
+def position_not_loaded(core: Conic) -> None:
+    """XT goes on from where the block before ended."""
+    _assign(core, core.xt.load, 0)
+
+
+# Only with the right stimuli: neither the documents nor the survey stalls, errs, resets, or gives
+# wrong turns.
+
+
+@_conic({*ALL} - {DOCUMENTS, COMPILED})
+def conic_step_lost_under_stall(core: Conic) -> None:
+    """A step that is not taken is forgotten, and the next one is computed."""
+    _assign(core, core.uu.ready, 1)
+
+
+@_conic({*ALL} - {DOCUMENTS, COMPILED})
+def sharp_not_refused(core: Conic) -> None:
+    """A curve is run however sharp it is at its start, or without a direction."""
+    _assign(core, core.uu.fault, ErrorCode.NONE)
+
+
+@_conic({*ALL} - {DOCUMENTS, COMPILED})
+def end_without_a_step_unanswered(core: Conic) -> None:
+    """A block whose last change of direction finds the end reached is never done."""
+    _assign(core, core.uu.stepless, 0)
+
+
+@_conic({EQUIVALENCE} | VERILOG)
+def preparation_not_reset(core: Conic) -> None:
+    """A block that is being prepared survives a reset, with what was prepared of it lost."""
+    fresh = Signal.like(core.held, name="held", reset_less=True)
+    core.registers["held"] = core.held = fresh
+
+
+# Equal to its golden model, and wrong.
+
+
+class _SideMisread(GoldenConic):
+    """The mistake of :func:`side_misread`, made a second time."""
+
+    def step(self, state, inputs, *tell):
+        misread = inputs | {"blocks_clockwise": inputs["blocks_clockwise"] ^ 1}
+        return super().step(state, misread, *tell)
+
+
+# A survey of conics tells the largest error, but there is no bound that it could be held to.
+@_conic({DOCUMENTS, PROMISES}, golden=_SideMisread)
+def side_misread(core: Conic) -> None:
+    """Device and golden model both take clockwise for counter-clockwise."""
+
+    def change(m: Module) -> None:
+        with m.If(core.blocks.valid & core.blocks.ready):
+            m.d.sync += core.clockwise.eq(~core.blocks.payload.clockwise)
+
+    _amend(core, change)

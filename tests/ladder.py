@@ -28,6 +28,7 @@ from discreta.hdl.contract import Part
 from discreta.hdl.plain import PlainPorts
 from discreta.hdl.verilog import verilog
 from discreta.sim import compiled as engine
+from discreta.sim import groups as survey_samples
 from discreta.sim import survey
 from discreta.sim.foreign import UnknownOutputError, available, run_foreign
 from discreta.sim.groups import survey_groups
@@ -40,6 +41,8 @@ from discreta.sim.stretch import EVENT_COLUMNS
 from tests import lecture
 from tests.arcs import arc_steps, draw_arcs, fault
 from tests.broken import ALL, SOUND, VARIANTS, Variant
+from tests.conics import FIELDS, conic_steps, draw_conics
+from tests.conics import fault as conic_fault
 from tests.hdl.traces import golden_trace
 
 __all__ = ["RUNGS", "matrix", "missing"]
@@ -74,7 +77,8 @@ def documents(variant: Variant) -> str:
         rows, taken = taken[: len(points)], taken[len(points) :]
         if len(rows) < len(points):
             return f"{name} takes {len(rows)} steps, where {sources[0][0]} has {len(points)}"
-        seen = (block[:2] + np.cumsum(rows[:, 1:3], axis=0)).tolist()
+        start = _FIELDS[variant.method.curve].index("start_x")
+        seen = (block[start : start + 2] + np.cumsum(rows[:, 1:3], axis=0)).tolist()
         for source, points in sources:
             for (t, point), (clock, *_), at in zip(points, rows.tolist(), seen, strict=True):
                 # The documents know no latency: summations are counted from the first step.
@@ -164,6 +168,14 @@ def _arc_documents(core: Part, block: list[int]) -> list[_Said]:
     return said
 
 
+def _conic_documents(core: Part, block: list[int]) -> list[_Said]:
+    """Read the rules, with every derivative and velocity from its definition."""
+    options = {name: core.parameters[name] for name in METHODS["conic"].choices}
+    steps = list(conic_steps(block, width=core.width, **options))
+    # The first summation is in clock n + 5, and its step leaves in the next.
+    return [("the rule", [(clock - core.width - 5, point) for clock, point in steps])]
+
+
 def _line_blocks() -> np.ndarray:
     """Draw lines of all kinds: every fourth of no length, some too long to run."""
     random = np.random.default_rng(SEED)
@@ -197,6 +209,31 @@ def _sound_arcs() -> np.ndarray:
     return np.array([*quarters, *_NAMED_ARCS, *sound])
 
 
+#: A turned ellipse almost all round.
+_NAMED_CONICS = [
+    (22, -17, 12, 0, 0, 7, 0, 7, 0, 0, 3),
+]
+
+#: Wrong ends and turns: ends backward along x, and along y; and one in a corner, which ends there.
+_WRONG_CONICS = [
+    (1, 0, 1, 0, 0, 4, 0, 2, 2, 0, 1),
+    (1, 0, 1, 0, 0, 0, 4, 2, 2, 1, 1),
+    (0, 0, 0, 1, -1, 15, 15, 15, 15, 0, 1),
+]
+
+
+def _conic_blocks() -> np.ndarray:
+    """Draw curves of all kinds, refused and empty ones among them, with those of a name between."""
+    return np.concatenate([draw_conics(WIDTH, 8, seed=SEED, turns=1), _NAMED_CONICS, _WRONG_CONICS])
+
+
+def _sound_conics() -> np.ndarray:
+    """Give curves of all kinds that are not refused, those of a name last."""
+    drawn = draw_conics(WIDTH, 10, seed=SEED + 1, turns=2).tolist()
+    sound = [block for block in drawn if not conic_fault(block) and block[5:7] != block[7:9]]
+    return np.array([*sound, *_NAMED_CONICS])
+
+
 def _lines() -> np.ndarray:
     """Give every line of the width, the line of no length last, behind one that moves."""
     return np.roll(survey_groups(METHODS["linear"], WIDTH)[0].blocks, -1, axis=0)
@@ -205,12 +242,17 @@ def _lines() -> np.ndarray:
 #: By the kind of curve: the fields of a block.
 _FIELDS: dict[str, tuple[str, ...]] = {"line": ("start_x", "start_y", "end_x", "end_y")}
 _FIELDS["arc"] = (*_FIELDS["line"], "center_x", "center_y", "clockwise", "full_turns")
+_FIELDS["conic"] = FIELDS
 
 #: By the kind of curve: what the documents are asked, and how they are read.
-_DOCUMENTS = {"line": (_lines(), _line_documents), "arc": (_sound_arcs(), _arc_documents)}
+_DOCUMENTS = {
+    "line": (_lines(), _line_documents),
+    "arc": (_sound_arcs(), _arc_documents),
+    "conic": (_sound_conics(), _conic_documents),
+}
 
 #: By the kind of curve: the blocks of the benches that know everything.
-_BLOCKS = {"line": _line_blocks(), "arc": _arc_blocks()}
+_BLOCKS = {"line": _line_blocks(), "arc": _arc_blocks(), "conic": _conic_blocks()}
 
 
 @cache
@@ -251,7 +293,7 @@ def _difference(seen: np.ndarray, expected: np.ndarray, names: list[str]) -> str
 
 
 #: By the kind of curve: the widths of rung 3.
-_EQUIVALENCE_WIDTHS = {"line": (WIDTH, 2 * WIDTH), "arc": (WIDTH,)}
+_EQUIVALENCE_WIDTHS = {"line": (WIDTH, 2 * WIDTH), "arc": (WIDTH,), "conic": (WIDTH,)}
 
 
 def equivalence_by_proof(variant: Variant) -> str:
@@ -306,14 +348,17 @@ class _Device:
     def _reset(self):
         return {name: register.init for name, register in self._core.registers.items()}
 
-    def _step(self, state, inputs):
-        return self._clock(state | inputs, self._rtl.registers, "{}'")
+    def _step(self, state, inputs, tell=None):
+        return self._clock(state | inputs, self._rtl.registers, "{}'", tell)
 
     def _outputs(self, state):
         return self._clock(state, self._rtl.outputs, "out.{}")
 
-    def _clock(self, given, wanted, symbol):
-        """Make a clock of its own, with given values before it, and give some of its values."""
+    def _clock(self, given, wanted, symbol, tell=None):
+        """Make a clock of its own, with given values before it, and give some of its values.
+
+        What ``tell`` puts in the place of a value between the registers is that value.
+        """
         wide = given["running"].size()
         number = len(self._clocks)
         own = {
@@ -327,6 +372,9 @@ class _Device:
             for name, (_, signed) in kinds.items()
             if name in given
         ]
+        for name, (_, signed) in self._rtl.intermediates.items() if tell else ():
+            value = extend(own[name][1], signed, wide)
+            facts.append(tell(name, value) == value)
         self._clocks.append((facts, _clocks_of(given.values())))
         return {
             name: extend(own[symbol.format(name)][1], signed, wide)
@@ -384,7 +432,9 @@ def compiled(variant: Variant) -> str:
     method = replace(
         variant.method, name=variant.name, device=lambda width, **_: variant.device(width)
     )
-    groups = survey_groups(method, WIDTH)
+    # Some curves of each kind tell as much here as thousands.
+    with patch.object(survey_samples, "_CURVES", 300):
+        groups = survey_groups(method, WIDTH)
     bound = method.bound(variant.golden(WIDTH))
     findings = []
     with (

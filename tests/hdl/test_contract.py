@@ -32,6 +32,7 @@ def test_error_codes():
         "NONE": 0,
         "RANGE": 1,
         "OFF_CURVE": 2,
+        "SHARP": 3,
     }
     assert Shape.cast(ErrorCode) == unsigned(2)
 
@@ -57,6 +58,16 @@ def test_accepts_axes(axes):
 )
 def test_refuses_width(width, error, message):
     assert_refused((error, message), check_width, width)
+
+
+def test_a_method_may_have_a_limit_of_its_own():
+    check_width(24, 24)
+    check_width(4, 24)
+    for width in (3, 25):
+        message = f"width is {width}: choose a whole number from 4 to 24"
+        assert_refused((ValueError, message), check_width, width, 24)
+    message = "width must be a whole number from 4 to 24, not 8.0"
+    assert_refused((TypeError, message), check_width, 8.0, 24)
 
 
 @pytest.mark.parametrize(("axes", "error", "message"), BAD_AXES)

@@ -10,15 +10,28 @@ import pytest
 
 import discreta
 from discreta.hdl.circular import Circular
+from discreta.hdl.conic import Conic
 from discreta.hdl.linear import Linear
 from discreta.hdl.plain import PlainPorts
 from discreta.hdl.verilog import verilog
 from discreta.sim.golden.circular import Circular as GoldenCircular
+from discreta.sim.golden.conic import Conic as GoldenConic
 from discreta.sim.golden.linear import Linear as GoldenLinear
 
-METHODS = ["linear", "circular"]
+METHODS = ["linear", "circular", "conic"]
 HANDSHAKE = ["input wire blocks_valid", "input wire steps_ready"]
-POINTS = {"linear": ("start", "end"), "circular": ("start", "end", "center")}
+#: Input ports of a block with 8 bits: name, bits.
+POINTS = [(f"{point}_{a}", 9) for point in ("start", "end", "center") for a in "xy"]
+NUMBERS = {
+    "linear": POINTS[:4],
+    "circular": POINTS,
+    "conic": [("a", 12), ("b", 12), ("c", 12), ("d", 21), ("e", 21), *POINTS[:4]],
+}
+DIRECTION = {
+    "linear": [],
+    "circular": ["input wire blocks_clockwise", "input wire [7:0] blocks_full_turns"],
+    "conic": ["input wire blocks_clockwise", "input wire [10:0] blocks_turns"],
+}
 OUTPUTS = [
     "output wire blocks_ready",
     "output wire signed [1:0] steps_x",
@@ -34,7 +47,7 @@ OUTPUTS = [
 
 
 def make(method: str):
-    return Linear(8, 2) if method == "linear" else Circular(8)
+    return {"linear": Linear, "circular": Circular, "conic": Conic}[method](8)
 
 
 @cache
@@ -59,10 +72,10 @@ def test_same_bytes_in_every_folder_and_for_every_hash_seed(tmp_path):
         done = subprocess.run(
             command, cwd=folder, env=environment, capture_output=True, timeout=100, check=True
         )
-        assert done.stdout == "".join(map(emit, METHODS)).encode()
+        assert done.stdout == (emit("linear") + emit("circular")).encode()
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["linear", "circular"])
 def test_twice_from_one_core(method):
     top = PlainPorts(make(method))
     assert verilog(top, f"discreta_{method}") == emit(method)
@@ -74,12 +87,11 @@ def test_ports_of_the_top_module(method):
     pattern = rf"^module discreta_{method} \((.*?)\);"
     header = re.search(pattern, emit(method), re.MULTILINE | re.DOTALL)
     assert header is not None
-    direction = ["input wire blocks_clockwise", "input wire [7:0] blocks_full_turns"]
     assert [line.strip() for line in header[1].split(",")] == [
         "input wire clk",
         "input wire rst",
-        *(f"input wire signed [8:0] blocks_{point}_{a}" for point in POINTS[method] for a in "xy"),
-        *(direction if method == "circular" else []),
+        *(f"input wire signed [{bits - 1}:0] blocks_{name}" for name, bits in NUMBERS[method]),
+        *DIRECTION[method],
         *HANDSHAKE,
         *OUTPUTS,
     ]
@@ -141,7 +153,22 @@ def test_hierarchy_and_registers_of_the_circular(width, order, normalize, preloa
     assert_plain(text)
 
 
-@pytest.mark.parametrize("method", METHODS)
+def test_hierarchy_and_registers_of_the_conic():
+    text = emit("conic")
+    parts = [*(f"{name}_register" for name in ("xt", "yt")), "p3_counter", "p4_counter"]
+    parts += ["gx_converter", "gy_converter", "first_adder", "second_adder"]
+    parts += ["core", "normalizer", "output", "uu"]
+    modules = re.findall(r"^module (\w+) \($", text, re.MULTILINE)
+    named = {f"discreta_conic_{part}": f"u_{part}" for part in parts}
+    assert sorted(modules) == sorted(["discreta_conic", *named])
+    instances = re.findall(r"^  (\w+) (\w+)\($", text, re.MULTILINE)
+    assert sorted(instances) == sorted(named.items())
+    assert_registers(text, GoldenConic(8))
+    # There is no multiplier anywhere: multiplying is adding, bit by bit.
+    assert not re.search(r"[\w)] \* [\w($]", text.partition("module ")[2])
+
+
+@pytest.mark.parametrize("method", ["linear", "circular"])
 def test_what_is_read_of_a_register_has_its_name(method):
     for register in ("p1", "p2", *(("sx", "sy", "xk", "yk") if method == "circular" else ())):
         assert re.search(rf"^    \.{register}\({register}\)", emit(method), re.MULTILINE)
@@ -167,11 +194,14 @@ def assert_plain(text):
 BEGINS = {
     "linear": "discreta_linear: Draws a straight line by summation of the increments; ",
     "circular": "discreta_circular: Draws an arc: each coordinate is summed to move the other; ",
+    "conic": "discreta_conic: Draws any curve of the second order: its two derivatives are summed ",
 }
 PARAMETERS = {
     "linear": "width = 8, axes = 2, normalize = True, preload = half (n = width, M = 2^n).",
     "circular": "width = 8, order = alternated, normalize = True, preload = half, guard = 2 "
     "(n = width, g = guard, M = 2^(n + g)).",
+    "conic": "width = 8, order = implicit, preload = half, guard = 2 "
+    "(n = width, g = guard, M = 2^(2n + 6 + g)).",
 }
 
 
@@ -192,11 +222,15 @@ def test_comment_at_the_top(method):
     assert list(rows) == names
     assert rows["blocks_end_y"].split() == ["input", "9", "signed", "block:", "end", "y"]
     assert rows["steps_valid"].split()[:2] == ["output", "1"]
-    assert rows["error"].endswith("why a block was not run; 0 NONE, 1 RANGE, 2 OFF_CURVE")
+    assert rows["error"].endswith("why a block was not run; 1 RANGE, 2 OFF_CURVE, 3 SHARP")
     if method == "circular":
         assert rows["blocks_center_x"].endswith("signed   block: center x")
-        assert rows["blocks_clockwise"].endswith("block: 1 runs clockwise, 0 counter-clockwise")
         assert rows["blocks_full_turns"].endswith("block: whole turns made before the arc itself")
+    if method == "conic":
+        assert rows["blocks_e"].split() == ["input", "21", "signed", "block:", "coefficient", "E"]
+        assert rows["blocks_turns"].endswith("block: changes of direction of an axis on the way")
+    if method != "linear":
+        assert rows["blocks_clockwise"].endswith("block: 1 runs clockwise, 0 counter-clockwise")
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -6,21 +6,27 @@ import numpy as np
 import pytest
 
 from discreta.hdl.circular import Circular
+from discreta.hdl.conic import Conic
 from discreta.hdl.linear import Linear
 from discreta.hdl.plain import PlainPorts
 from discreta.hdl.verilog import verilog
 from discreta.sim import foreign
 from discreta.sim.foreign import SIMULATORS, UnknownOutputError, available, lint, run_foreign
 from discreta.sim.golden.circular import Circular as GoldenCircular
+from discreta.sim.golden.conic import Conic as GoldenConic
 from discreta.sim.golden.linear import Linear as GoldenLinear
 from discreta.sim.stalls import NO_STALLS, Stalls
 from tests.arcs import draw_arcs
+from tests.conics import draw_conics, moved_far
 from tests.hdl.traces import golden_trace
 
 MODULE = "discreta_device"
 OPTIONS = [(normalize, preload) for normalize in (False, True) for preload in ("zero", "half")]
-#: Width, axes, normalize, preload of a line; width, order, normalize, preload, guard of an arc.
+#: Width, axes, normalize, preload of a line; width, order, normalize, preload, guard of an arc;
+#: width, order, preload, guard of a conic.
 LINE, ARC = (8, 2, True, "half"), (8, "alternated", True, "half", 2)
+CONIC = (8, "implicit", "half", 2)
+CONICS = (CONIC, (5, "simultaneous", "zero", 0), (24, "alternated", "half", 1))
 LECTURE = ("simultaneous", False, "zero", 0)
 
 
@@ -30,19 +36,24 @@ def need(simulator: str) -> None:
 
 
 def golden_of(configuration):
-    model = GoldenLinear if len(configuration) == 4 else GoldenCircular
-    return model(*configuration)
+    _, first, *rest = configuration
+    if isinstance(first, int):
+        return GoldenLinear(*configuration)
+    return (GoldenCircular if len(rest) == 3 else GoldenConic)(*configuration)
 
 
 @cache
 def emit(configuration: tuple) -> tuple[PlainPorts, str]:
     width, *options = configuration
-    if len(options) == 3:
+    if isinstance(options[0], int):
         axes, normalize, preload = options
         core = Linear(width, axes, normalize=normalize, preload=preload)
-    else:
+    elif len(options) == 4:
         order, normalize, preload, guard = options
         core = Circular(width, order=order, normalize=normalize, preload=preload, guard=guard)
+    else:
+        order, preload, guard = options
+        core = Conic(width, order=order, preload=preload, guard=guard)
     top = PlainPorts(core)
     return top, verilog(top, MODULE)
 
@@ -92,6 +103,16 @@ def assert_arcs(simulator, configuration, clocks, radius, stalls):
     assert_equal_to_golden(simulator, configuration, blocks, (14, 2), clocks, stalls)
 
 
+def conics_of(width: int, count: int, *, seed: int) -> np.ndarray:
+    """Draw curves of few steps, as far out as the width goes, refused and empty ones among them."""
+    return moved_far(draw_conics(4, count, seed=seed, turns=2), width)
+
+
+def assert_conics(simulator, configuration, clocks, stalls):
+    blocks = conics_of(configuration[0], 16, seed=8)
+    assert_equal_to_golden(simulator, configuration, blocks, (14, 2), clocks, stalls)
+
+
 @pytest.mark.parametrize("stalls", [NO_STALLS, Stalls(seed=3, stall=0.4, gap=0.6)])
 @pytest.mark.parametrize(
     ("configuration", "clocks", "longest"),
@@ -121,6 +142,17 @@ def test_arcs_in_icarus_equal_golden(configuration, clocks, radius, stalls):
 
 
 @pytest.mark.parametrize(
+    ("configuration", "stalls"),
+    [
+        (CONICS[1], Stalls(seed=3, stall=0.4, gap=0.6)),
+        (CONICS[2], NO_STALLS),
+    ],
+)
+def test_conics_in_icarus_equal_golden(configuration, stalls):
+    assert_conics("icarus", configuration, 1500, stalls)
+
+
+@pytest.mark.parametrize(
     ("configuration", "clocks", "longest", "stalls"),
     [
         (LINE, 3000, 255, NO_STALLS),
@@ -145,6 +177,22 @@ def test_arcs_with_stalls_and_resets_equal_golden(simulator):
     busy = expected[:, list(top.outputs).index("busy")]
     assert [clock for clock in resets if not busy[clock]] == [6]
     trace = run_foreign(text, MODULE, top, simulator, blocks, 1500, stalls, resets=resets)
+    np.testing.assert_array_equal(trace, expected)
+
+
+@pytest.mark.parametrize("simulator", SIMULATORS)
+def test_conics_with_stalls_and_resets_equal_golden(simulator):
+    """Reset while one is prepared and while one runs, of which there is never more than one."""
+    need(simulator)
+    top, text = emit(CONIC)
+    blocks = conics_of(8, 24, seed=9)
+    resets = (5, 6, 60, 150)
+    stalls = Stalls(seed=5, stall=0.3)
+    expected, done, rejected = expect(CONIC, blocks, 1800, stalls, resets)
+    busy = expected[:, list(top.outputs).index("busy")]
+    lost = sum(busy[clock] for clock in resets)
+    assert (lost, done + rejected) == (3, 24 - 3)
+    trace = run_foreign(text, MODULE, top, simulator, blocks, 1800, stalls, resets=resets)
     np.testing.assert_array_equal(trace, expected)
 
 
@@ -194,14 +242,16 @@ def without_initial_values(text: str, configuration: tuple) -> str:
 
 
 @pytest.mark.parametrize("reset", [False, True])
-@pytest.mark.parametrize("configuration", [LINE, ARC])
+@pytest.mark.parametrize("configuration", [LINE, ARC, CONIC])
 def test_starts_from_initial_values_alone_and_from_reset_alone(configuration, reset):
     need("icarus")
     top, text = emit(configuration)
     if configuration == LINE:
         blocks = lines_of(8, 2, seed=6, longest=30)
-    else:
+    elif configuration == ARC:
         blocks = draw_arcs(8, 8, seed=6, radius=5, turns=1)
+    else:
+        blocks = conics_of(8, 8, seed=6)
     expected, *_ = expect(configuration, blocks, 400)
     if reset:
         text = without_initial_values(text, configuration)
@@ -305,6 +355,7 @@ def test_unknown_simulator():
         (5, "simultaneous", True, "half", 1),
         (16, *LECTURE),
         (32, "alternated", False, "half", 0),
+        *CONICS,
     ],
     ids=lambda configuration: "-".join(map(str, configuration)),
 )
@@ -341,7 +392,8 @@ def test_lint_sees_what_is_wrong(right, wrong, rule):
 
 def test_every_waiver_is_needed(monkeypatch):
     need("verilator")
-    texts = [emit(configuration)[1] for configuration in (LINE, (4, *LECTURE))]
+    configurations = (LINE, (4, *LECTURE), *CONICS)
+    texts = [emit(configuration)[1] for configuration in configurations]
     waivers = foreign.LINT_WAIVERS
     for waiver in waivers:
         monkeypatch.setattr(foreign, "LINT_WAIVERS", [kept for kept in waivers if kept != waiver])

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from discreta.sim import groups
+from discreta.sim.conics import KINDS, curve_points, parabola
 from discreta.sim.groups import SAMPLE_BUDGET, SEED, WHOLE_BUDGET, survey_groups, whole_degrees
 from discreta.sim.methods import METHODS
 from tests import lecture
 from tests.arcs import fault, on_curve, quadrant_after, seen
+from tests.conics import derivatives
 
-LINES, ARCS = METHODS["linear"], METHODS["circular"]
+LINES, ARCS, CONICS = METHODS["linear"], METHODS["circular"], METHODS["conic"]
 
 
 @pytest.mark.parametrize("width", [4, 8, 9, 10, 19])
@@ -41,7 +43,15 @@ def test_lines(width):
     assert not group.answers.any()
 
 
-@pytest.mark.parametrize("method", [LINES, ARCS])
+@pytest.fixture
+def few_conics(monkeypatch):
+    """Have few curves, for what does not depend on their number."""
+    monkeypatch.setattr(groups, "_CURVES", 300)
+    monkeypatch.setattr(groups, "_TEN_TURNS", 3)
+
+
+@pytest.mark.usefixtures("few_conics")
+@pytest.mark.parametrize("method", [LINES, ARCS, CONICS])
 def test_the_same_every_time(method):
     for group, again in zip(survey_groups(method, 10), survey_groups(method, 10), strict=True):
         assert group.title == again.title
@@ -121,6 +131,128 @@ def test_steps_of_the_faster_axis():
         moves = np.diff(walked)
         faster = np.maximum(np.abs(moves.real), np.abs(moves.imag)).sum()
         assert length == pytest.approx(faster, rel=1e-3)
+
+
+def kind_of(block):
+    """Tell the kind of a curve by its coefficients."""
+    a, b, c = block[:3]
+    if (a, b, c) == (0, 0, 0):
+        return "line"
+    if a == c and b == 0:
+        return "circle"
+    return {1: "ellipse", 0: "parabola", -1: "hyperbola"}[np.sign(4 * a * c - b * b)]
+
+
+def test_a_hundred_thousand_conics_of_12_bits(monkeypatch):
+    monkeypatch.setattr(groups, "_TEN_TURNS", 1)
+    *kinds, _ = survey_groups(CONICS, 12)
+    assert len(kinds) == len(KINDS)
+    assert sum(len(group.blocks) for group in kinds) >= 100_000
+    for kind, group in zip(KINDS, kinds, strict=True):
+        assert group.title == f"a sample (seed {SEED}) of {len(group.blocks)} {kind}s"
+        assert group.blocks.shape == (len(group.lengths), 11)
+        assert not group.answers.any()
+        # Of a thousand ellipses some are round when their coefficients are whole.
+        found = {kind_of(block) for block in group.blocks[::20].tolist()}
+        assert found - ({"circle"} if kind == "ellipse" else set()) == {kind}
+        assert len(np.unique(group.blocks, axis=0)) > 0.99 * len(group.blocks)
+        assert np.abs(group.blocks[:, 5:9]).max() > 0.99 * 2**12
+        assert set(group.blocks[:, 9]) == {0, 1}
+
+
+def of_ellipse(block):
+    """Give the semi-axes and extents along x and y of an ellipse, and along the diagonals.
+
+    Of u·S⁻¹·u = 1 the extent along a unit vector n is √(n·S·n).
+    """
+    a, b, c, d, e, x, y = map(float, block[:7])
+    curl = 4 * a * c - b * b
+    center = np.array([b * e - 2 * c * d, b * d - 2 * a * e]) / curl
+    u, v = (x, y) - center
+    size = (a * u * u + b * u * v + c * v * v) * 2 / curl
+    p, r, q = size * 2 * c, -size * b, size * 2 * a
+    axes = np.sqrt(np.linalg.eigvalsh([[p, r], [r, q]]))
+    return axes, np.sqrt([p, q]), np.sqrt([p + q + 2 * r, p + q - 2 * r]), center
+
+
+@pytest.mark.parametrize("width", [4, 12])
+def test_ten_turns_of_ellipses(monkeypatch, width):
+    monkeypatch.setattr(groups, "_CURVES", 10)
+    monkeypatch.setattr(groups, "_TEN_TURNS", 12)
+    *_, group = survey_groups(CONICS, width)
+    blocks = group.blocks.tolist()
+    assert group.title == "ten turns of 12 ellipses"
+    assert len(blocks) == 12
+    assert not group.answers.any()
+    ratios, turned = [], []
+    for block, length in zip(blocks, group.lengths, strict=True):
+        assert kind_of(block) in ("ellipse", "circle")
+        assert block[5:7] == block[7:9]
+        # Of those at the start, on an axis, the first is no change.
+        assert block[10] == 40 - (0 in derivatives(block, block[5:7]))
+        (shorter, longer), extents, diagonals, center = of_ellipse(block)
+        assert shorter**2 / longer > 2
+        assert np.all(np.abs(center) + extents < 2**width - 1)
+        ratios.append(longer / shorter)
+        turned.append(np.ptp(diagonals) / longer)
+        # From diagonal to diagonal tangent the same axis is faster: 2·(√(n·S·n) + √(m·S·m)).
+        assert length == pytest.approx(10 * 2 * diagonals.sum())
+    # Up to √(longer / 3), by the logarithm.
+    assert min(ratios) < {4: 1.2, 12: 3}[width]
+    assert max(ratios) > {4: 1.5, 12: 20}[width]
+    assert max(turned) > 0.3
+    assert {block[9] for block in blocks} == {0, 1}
+
+
+def test_steps_of_the_faster_axis_of_conics():
+    """Where |Gx| = |Gy| the other axis becomes the faster one."""
+    root = sqrt(0.5)
+    for block, length in (
+        ((0, 0, 0, 3, -4, 0, 0, 40, 30, 0, 0), 40),
+        ((1, 0, 1, 0, 0, 100, 0, 0, 100, 0, 0), 100 * 2 * root),
+        ((1, 0, 1, 0, 0, 100, 0, 0, -100, 0, 2), 300 * 2 * root),
+        ((1, 0, 1, 0, 0, 100, 0, 0, -100, 1, 0), 100 * 2 * root),
+        ((1, 0, 1, 0, 0, 100, 0, 100, 0, 1, 4), 400 * 2 * root),
+        ((1, 0, 1, 0, 0, 100, 0, 0, -100, 1, 8), 900 * 2 * root),
+        # x² / 80² + y² / 60² = 1: a quarter is √(80² + 60²).
+        ((9, 0, 16, 0, 0, 80, 0, -80, 0, 0, 2), 200),
+        ((9, 0, 16, 0, 0, 0, 60, 0, 60, 1, 12), 1200),
+        # y² = 200x: 100 of y up to (50, 100), then 150 of x.
+        (parabola((0, 0), (0, 100), (200, 200), 8).block, 250),
+        # xy = 40,000: 200 of y to the vertex, then 200 of x.
+        ((0, 1, 0, 0, 0, 100, 400, 400, 100, 0, 0), 400),
+        ((0, -1, 0, 0, 0, 400, 100, 100, 400, 1, 0), 400),
+    ):
+        (found,) = groups._steps_of_conics(np.array([block], dtype=np.int64))
+        assert found == pytest.approx(length), block
+
+
+@pytest.mark.usefixtures("few_conics")
+@pytest.mark.parametrize("width", [5, 12])
+def test_steps_of_the_faster_axis_of_conics_walked(width):
+    for group in survey_groups(CONICS, width)[:-1]:
+        for block, length in zip(group.blocks[::15], group.lengths[::15], strict=True):
+            walked = np.abs(np.diff(curve_points(block), axis=0)).max(axis=1).sum()
+            walked *= max(1, -(-block[10] // 4))
+            # They are not always at one in where the curve is nearest to the end.
+            assert length == pytest.approx(walked, rel=2e-3, abs=0.15)
+
+
+def test_conics_that_would_take_too_long_are_a_sample(monkeypatch):
+    monkeypatch.setattr(groups, "_TEN_TURNS", 12)
+    *kinds, turns = survey_groups(CONICS, 14)
+    # Half of 2^-2 of a step a clock.
+    clocks = [8 * group.lengths.sum() for group in (*kinds, turns)]
+    for group, taken in zip(kinds, clocks, strict=False):
+        if len(group.blocks) == 20_000:
+            assert taken <= WHOLE_BUDGET
+        else:
+            assert 0.9 * SAMPLE_BUDGET < taken <= SAMPLE_BUDGET
+    assert 0 < sum(len(group.blocks) == 20_000 for group in kinds) < 5
+    assert turns.title == f"ten turns of {len(turns.blocks)} ellipses"
+    # Ten turns of 2^14 steps of radius are up to 40·√2·2^14 steps.
+    assert len(turns.blocks) < 12
+    assert 1 - 8 * 40 * sqrt(2) * 2**14 / SAMPLE_BUDGET < clocks[-1] / SAMPLE_BUDGET <= 1
 
 
 def test_all_whole_degrees():
@@ -205,6 +337,16 @@ def test_a_width_that_takes_too_long_is_refused(width):
     )
     with pytest.raises(ValueError, match=message):
         survey_groups(LINES, width)
+
+
+@pytest.mark.parametrize("width", [17, 32])
+def test_a_width_that_takes_too_long_for_conics(width):
+    message = (
+        f"^width {width} is too large to survey: one curve of {2**width} steps takes up to "
+        f"{2 ** (width + 3)} clocks; choose a width up to 16$"
+    )
+    with pytest.raises(ValueError, match=message):
+        survey_groups(CONICS, width)
 
 
 @pytest.mark.parametrize("choose", [survey_groups, whole_degrees])

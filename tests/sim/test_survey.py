@@ -18,15 +18,18 @@ from discreta.hdl.linear import Linear
 from discreta.sim import groups as choice
 from discreta.sim import survey as module
 from discreta.sim.arcs import refusals
+from discreta.sim.conics import distance as distance_from_conic
+from discreta.sim.conics import random_blocks
 from discreta.sim.golden.linear import Linear as GoldenLinear
 from discreta.sim.groups import Group, survey_groups
 from discreta.sim.methods import METHODS
 from discreta.sim.survey import SurveyRow, say_worst, survey
 from tests import lecture
 from tests.arcs import run_arcs
+from tests.conics import conic_steps, first_way, run_conics, velocity
 from tests.lines import distance, line_steps
 
-LINES, ARCS = METHODS["linear"], METHODS["circular"]
+LINES, ARCS, CONICS = METHODS["linear"], METHODS["circular"], METHODS["conic"]
 
 #: The arcs' method without normalizer and guard bits: order and preload alone.
 PLAIN = replace(ARCS, choices={**ARCS.choices, "normalize": (False,), "guard": (0,)})
@@ -164,6 +167,86 @@ def test_circles_turns_and_arcs_of_5_bits(monkeypatch):
         for name in ("ends_missed", "completed", "summations", "findings"):
             assert getattr(other, name) == getattr(row, name)
         assert other.length == pytest.approx(row.length)
+
+
+@pytest.fixture
+def few_conics(monkeypatch):
+    monkeypatch.setattr(choice, "_CURVES", 15)
+    monkeypatch.setattr(choice, "_TEN_TURNS", 2)
+
+
+@pytest.mark.usefixtures("compiled_engine", "few_conics")
+def test_conics_of_5_bits():
+    """Against the sums worked out from their definitions, to the clock."""
+    # Of all kinds at once, for fewer runs.
+    found = survey_groups(CONICS, 5)
+    columns = (
+        np.concatenate([getattr(group, name) for group in found])
+        for name in ("blocks", "answers", "lengths")
+    )
+    group = Group("conics", *columns)
+    variants = list(CONICS.settings.values())
+    rows = list(survey(CONICS, 5, [group], variants))
+    assert len(rows) == len(variants)
+    for row in rows:
+        runs = list(run_conics(group.blocks.tolist(), width=5, **row.variant))
+        errors = [
+            distance_from_conic(b[:5], b[5:7], np.array([p for _, p in run.steps])).max()
+            for run, b in zip(runs, group.blocks, strict=True)
+        ]
+        assert row.largest_error == pytest.approx(max(errors), abs=1e-9)
+        assert row.error_index == np.flatnonzero(np.isclose(errors, max(errors)))[0]
+        assert row.error_at in [point for _, point in runs[row.error_index].steps]
+        *_, last, most = sorted(errors)
+        # So many of the blocks, counted from 0, lie below it.
+        share = 0.999 * (len(errors) - 1) - (len(errors) - 2)
+        assert row.usual_error == pytest.approx(last + share * (most - last), abs=1e-9)
+        assert row.clocks == runs[-1].answered + 1
+        # From the clock behind the start to that in which the last step shows.
+        assert row.summations == sum(r.steps[-1][0] - r.started - 1 for r in runs)
+        assert (row.blocks, row.compared, row.ends_missed) == (len(runs), len(runs), 0)
+        assert row.good
+        # Parts and budget are shared out by about the clocks that they take; what simultaneous
+        # sums lead farther and farther out takes more.
+        golden = CONICS.model(5, **row.variant)
+        expected = module._CURVES["conic"].clocks(CONICS, golden, group).sum()
+        assert row.clocks > 0.75 * expected
+        assert row.clocks < 1.25 * expected or golden.order == "simultaneous"
+
+
+def completes(block, width):
+    """Tell of a block without changes of direction whether nothing moves but what is completed."""
+    point, way = block[5:7], first_way(block)
+    for _, step in conic_steps(block, width=width):
+        speed = velocity(block, point)
+        left = [goal - now for goal, now in zip(block[7:9], point, strict=True)]
+        if not any(speed[k] * way[k] > 0 and left[k] * way[k] > 0 for k in (0, 1)):
+            return True
+        point = step
+    return False
+
+
+@pytest.mark.usefixtures("compiled_engine")
+def test_completing_steps_of_conics_are_counted(monkeypatch):
+    """Those that the definition of the velocities asks for, compared or not."""
+    random = np.random.default_rng(5)
+    kinds = [random_blocks(kind, 5, 200, random) for kind in ("circle", "ellipse", "hyperbola")]
+    blocks = np.concatenate(kinds)
+    blocks = blocks[blocks[:, 10] == 0]
+    # A step aside, over the vertex and before it.
+    blocks[:, 7:9] += random.integers(-1, 2, (len(blocks), 2))
+    inside = (np.abs(blocks[:, 7:9]) < 31).all(axis=1)
+    blocks = blocks[inside & (blocks[:, 7:9] != blocks[:, 5:7]).any(axis=1)]
+    expected = sum(completes(block, 5) for block in blocks.tolist())
+    assert 10 < expected < len(blocks) / 2
+    group = Group("conics", blocks, np.zeros(len(blocks), dtype=int), np.ones(len(blocks)))
+    variant = CONICS.settings["default"]
+    for budget in (module.REGISTER_BUDGET, 0):
+        monkeypatch.setattr(module, "REGISTER_BUDGET", budget)
+        (row,) = survey(CONICS, 5, [group], [variant])
+        assert row.completed == expected
+        assert row.compared == (row.blocks if budget else 0)
+        assert row.good
 
 
 def group_of(blocks, width):
@@ -404,6 +487,10 @@ def test_parts_of_a_row_add_up():
         length=1.5,
     )
     assert row.good
+    assert row.usual_error == 0
+    row.add(SurveyRow({}, 0, block_errors=np.arange(600, 1001)))
+    row.add(SurveyRow({}, 0, block_errors=np.arange(600)))
+    assert row.usual_error == 999
     row.add(SurveyRow({}, 0, ends_missed=1))
     assert not row.good
     assert not SurveyRow({}, 0, findings=["p1 is 3"]).good
@@ -417,6 +504,12 @@ def test_the_worst_of_a_row_as_a_table_has_it():
     assert say_worst(ARCS, arcs, row) == ("5,6 to 7,8 about 6,7 cw", "0,5")
     lines = Group("lines", np.array([[3, 4, 1, 9]]), np.zeros(1), np.zeros(1))
     assert say_worst(LINES, lines, SurveyRow({}, 0, error_at=(2, 6))) == ("-2,5", "-1,2")
+    curves = np.array([[0, 1, 0, 0, -2, 2, 5, 3, 4, 0, 1], [1, 0, 1, 0, 0, 7, 0, 7, 0, 1, 39]])
+    conics = Group("conics", curves, np.zeros(2), np.zeros(2))
+    row = SurveyRow({}, 0, error_at=(0, 5))
+    assert say_worst(CONICS, conics, row) == ("0,1,0,0,-2 from 2,5 to 3,4", "0,5")
+    row = replace(row, error_index=1)
+    assert say_worst(CONICS, conics, row)[0] == "1,0,1,0,0 from 7,0 to 7,0 cw, 10 turns"
 
 
 @pytest.mark.usefixtures("compiled_engine")
@@ -438,11 +531,12 @@ def test_the_command(monkeypatch):
         )
     ]
     assert re.split(r"  +", lines[1].strip()) == [
-        *("variant", "largest error", "on the arc", "at", "clocks/step", "ends missed", "completed")
+        *("variant", "largest error", "99.9 %", "on the arc", "at", "clocks/step"),
+        *("ends missed", "completed"),
     ]
     assert len(lines) == 4 * (2 + 2) + 1
     for line, variant in zip(lines[2:4], method.variants(), strict=True):
-        name, largest, arc, _, clocks, missed, completed = re.split(r"  +", line.strip())
+        name, largest, usual, arc, _, clocks, missed, completed = re.split(r"  +", line.strip())
         assert name == (
             f"order {variant['order']}, preload {variant['preload']}, no normalize, guard 0"
         )
@@ -454,12 +548,37 @@ def test_the_command(monkeypatch):
             for radius in range(1, 32)
         }
         assert largest == f"{max(errors.values()):.4f}"
+        last, most = sorted(errors.values())[-2:]
+        assert usual == f"{most - 0.03 * (most - last):.4f}"
         radius = int(arc.split(",")[0])
         assert arc == f"{radius},0 to 0,{radius}"
         assert errors[radius] == pytest.approx(max(errors.values()), abs=1e-12)
         # The 32 of a radian by the √2 R / (π R / 2) of a step.
         assert float(clocks) > 2
         assert (missed, completed) == ("0", "0")
+
+
+@pytest.mark.usefixtures("compiled_engine", "few_conics")
+def test_the_command_with_conics(monkeypatch):
+    kinds = ("line", "hyperbola")
+    monkeypatch.setattr(choice, "KINDS", kinds)
+    result = CliRunner().invoke(cli, ["survey", "conic", "--width", "5", "--setting", "default"])
+    assert result.exit_code == 0
+    *tables, _ = result.output.splitlines()
+    titles, heads, rows = tables[::3], tables[1::3], tables[2::3]
+    whats = [*(f"a sample (seed 1970) of 15 {kind}s" for kind in kinds), "ten turns of 2 ellipses"]
+    assert titles == [f"conic, width 5: {what}, every register compared" for what in whats]
+    assert re.split(r"  +", heads[0].strip()) == [
+        *("variant", "largest error", "99.9 %", "on the conic", "at", "clocks/step"),
+        *("ends missed", "completed"),
+    ]
+    for row in rows:
+        name, largest, usual, _, _, clocks, missed, _ = re.split(r"  +", row.strip())
+        assert name == "order implicit, preload half, guard 2"
+        assert 0.5 < float(usual) <= float(largest) < 2
+        # 4 to 8, in the mean 4 / ln 2, and a clock for every change of direction.
+        assert 4 < float(clocks) < 8
+        assert missed == "0"
 
 
 @pytest.mark.usefixtures("compiled_engine", "one_process")
@@ -486,6 +605,8 @@ def test_the_command_fails_when_an_end_is_missed_or_a_register_differs(monkeypat
         (["linear", "--whole-degrees"], "there are no lines between whole degrees"),
         (["circular", "--width", "7", "--whole-degrees"], "choose a width from 8"),
         (["circular", "--width", "17"], "choose a width up to 16"),
+        (["conic", "--whole-degrees"], "there are no conics between whole degrees"),
+        (["conic", "--width", "17"], "choose a width up to 16"),
     ],
 )
 def test_what_cannot_be_surveyed(words, message):

@@ -7,7 +7,7 @@ from discreta.hdl.contract import ErrorCode
 from discreta.hdl.parts import ControlUnit
 from tests.hdl.parts.clocked import run
 
-INPUTS = ("pending", "fault", "empty", "waiting", "ready", "ending")
+INPUTS = ("pending", "fault", "empty", "waiting", "ready", "ending", "stepless")
 
 
 def give(ctx, part, **inputs):
@@ -71,6 +71,44 @@ def test_a_block_of_two_steps():
     run(part, bench)
 
 
+def test_a_stepless_end():
+    """It is answered in the next clock, once, though no step was the last one."""
+    part = ControlUnit()
+
+    async def bench(ctx):
+        give(ctx, part, pending=1)
+        await ctx.tick()
+        # A step waits, and what ends the block waits for it.
+        give(ctx, part, waiting=1, ending=1, stepless=1)
+        for _ in range(3):
+            assert get(ctx, part, "clock taken last done busy") == [0, 0, 0, 0, 1]
+            await ctx.tick()
+        give(ctx, part, waiting=1, ready=1, ending=1, stepless=1)
+        assert get(ctx, part, "clock taken last done") == [1, 1, 0, 0]
+        await ctx.tick()
+        give(ctx, part)
+        assert get(ctx, part, "clock idle done busy") == [0, 1, 1, 0]
+        await ctx.tick()
+        assert get(ctx, part, "clock idle done busy") == [0, 1, 0, 0]
+
+        # A block with one alone, and another one behind it at once.
+        give(ctx, part, pending=1)
+        await ctx.tick()
+        give(ctx, part, pending=1, ending=1, stepless=1)
+        assert get(ctx, part, "start clock done") == [0, 1, 0]
+        await ctx.tick()
+        give(ctx, part, pending=1)
+        assert get(ctx, part, "start clock done") == [1, 0, 1]
+        await ctx.tick()
+        # Without an end it says nothing.
+        give(ctx, part, stepless=1)
+        for _ in range(2):
+            assert get(ctx, part, "clock done") == [1, 0]
+            await ctx.tick()
+
+    run(part, bench)
+
+
 @pytest.mark.parametrize("empty", [0, 1])
 @pytest.mark.parametrize("code", [ErrorCode.RANGE, ErrorCode.OFF_CURVE])
 def test_a_faulty_block_is_dropped_with_an_error(code, empty):
@@ -130,7 +168,7 @@ def test_every_input_in_every_state(running):
 
     async def bench(ctx):
         for values in product((0, 1), repeat=len(INPUTS)):
-            pending, fault, empty, waiting, ready, ending = values
+            pending, fault, empty, waiting, ready, ending, stepless = values
             taken = waiting and ready
             give(ctx, part, ending=1)
             await ctx.tick()
@@ -154,6 +192,7 @@ def test_every_input_in_every_state(running):
             give(ctx, part)
             runs = not empty if load else running and not (clock and ending)
             done = (taken and not running) or (load and empty)
+            done = done or (clock and ending and stepless)
             error = ErrorCode.RANGE if start and fault else ErrorCode.NONE
             assert get(ctx, part, "clock done error") == [runs, done, error], values
             await ctx.tick()
@@ -181,6 +220,7 @@ def test_every_started_block_is_answered_once(seed):
             pending, empty = block is not None, length == 0
             ready = draining or rng.random() < 0.6
             ending = left == 1
+            stepless = ending and rng.random() < 0.3
             give(
                 ctx,
                 part,
@@ -190,6 +230,7 @@ def test_every_started_block_is_answered_once(seed):
                 waiting=waiting,
                 ready=ready,
                 ending=ending,
+                stepless=stepless,
             )
 
             # Two blocks can never share a clock of done: due_done would be 2.
@@ -207,10 +248,11 @@ def test_every_started_block_is_answered_once(seed):
             if waiting:
                 assert ctx.get(part.last) == (left == 0)
 
-            due_done = int(last_taken) + int(load and empty)
+            stepless_end = clocked and stepless
+            due_done = int(last_taken) + int(load and empty) + int(stepless_end)
             due_error = ErrorCode.RANGE if start and fault else ErrorCode.NONE
             if clocked:
-                waiting = ending or rng.random() < 0.5
+                waiting = not stepless if ending else rng.random() < 0.5
                 left -= 1
             elif taken:
                 waiting = False

@@ -1,3 +1,4 @@
+import random
 from itertools import product
 
 import numpy as np
@@ -8,21 +9,28 @@ from discreta.hdl.parts import Normalizer
 from tests.hdl.parts.clocked import BAD_AXES, BAD_WIDTHS, assert_refused, run
 
 
-def shifted_one_place_at_a_time(increments, width):
-    while any(increments) and max(increments) < 2 ** (width - 1):
+def shifted_one_place_at_a_time(increments, width, signed):
+    """Double all of them as long as nothing is lost; give what comes of them and the places."""
+    low, high = (-(2 ** (width - 1)), 2 ** (width - 1) - 1) if signed else (0, 2**width - 1)
+    places = 0
+    while any(increments) and all(low <= 2 * value <= high for value in increments):
         increments = [2 * value for value in increments]
-    return list(increments)
+        places += 1
+    return list(increments), places
 
 
-def assert_normalizes(width, axes, sets):
-    part = Normalizer(width, axes)
+def assert_normalizes(width, axes, sets, *, signed=False):
+    part = Normalizer(width, axes, signed=signed)
     letters = AXIS_LETTERS[:axes]
 
     async def bench(ctx):
         for increments in sets:
             ctx.set(part.increments, dict(zip(letters, increments, strict=True)))
             normalized = [ctx.get(part.normalized[letter]) for letter in letters]
-            assert normalized == shifted_one_place_at_a_time(increments, width), increments
+            shifted, places = shifted_one_place_at_a_time(increments, width, signed)
+            assert normalized == shifted, increments
+            if any(increments):
+                assert ctx.get(part.places) == places, increments
 
     run(part, bench)
 
@@ -51,6 +59,46 @@ def test_one_bit_of_one_axis_limits_all(width, axes):
     ]
     full = [[(1 << bits) - 1] * axes for bits in range(width + 1)]
     assert_normalizes(width, axes, sets + full)
+
+
+# With a sign.
+
+
+def test_every_pair_of_signed_numbers():
+    for width in (2, 4, 5):
+        numbers = range(-(2 ** (width - 1)), 2 ** (width - 1))
+        assert_normalizes(width, 2, product(numbers, repeat=2), signed=True)
+
+
+@pytest.mark.parametrize(("width", "axes"), [(15, 5), (39, 5), (55, 5), (71, 2), (72, 6)])
+def test_signed_numbers_of_every_size(width, axes):
+    """The least number −2^(w − 1) lets nothing move, and −2^k goes a place farther than 2^k."""
+    powers = [sign * 2**k for k in range(width - 1) for sign in (1, -1)]
+    alone = [*powers, *(power - 1 for power in powers), -(2 ** (width - 1)), 0, -1]
+    alone = [value for value in alone if value < 2 ** (width - 1)]
+    sets = [[0] * k + [value] + [0] * (axes - 1 - k) for value in alone for k in (0, axes - 1)]
+    sets += [[value, -1] + [0] * (axes - 2) for value in alone]
+    draw = random.Random(width)
+    for _ in range(150):
+        size = 2 ** draw.randrange(width)
+        sets.append([draw.randint(-size, size - 1) for _ in range(axes)])
+    assert_normalizes(width, axes, sets, signed=True)
+
+
+def test_signed_numbers_by_hand():
+    for numbers, shifted in (
+        ((-1, 0), (-16, 0)),
+        ((1, 0), (8, 0)),
+        ((-3, 2), (-12, 8)),
+        ((-4, 3), (-16, 12)),
+        ((-4, 4), (-8, 8)),
+        ((-8, -8), (-16, -16)),
+        ((-16, 1), (-16, 1)),
+        ((-9, 7), (-9, 7)),
+        ((0, 0), (0, 0)),
+    ):
+        assert shifted_one_place_at_a_time(numbers, 5, True)[0] == list(shifted)
+        assert_normalizes(5, 2, [numbers], signed=True)
 
 
 @pytest.mark.parametrize(("width", "error", "message"), BAD_WIDTHS)
