@@ -2,7 +2,7 @@
 
 from typing import Any, ClassVar
 
-from amaranth import Cat, Module, Mux, Signal, Value
+from amaranth import Cat, Const, Module, Mux, Signal, Value
 from amaranth.hdl import signed
 from amaranth.lib import data, stream
 from amaranth.lib.wiring import In, Out
@@ -85,11 +85,12 @@ class Conic(Part):
     summation before the other one, as it must be for the path to be true.
 
     Scale: before every summation Gx, Gy and with them 2A, B, 2C are shifted left together until one
-    has its top bit set. A derivative of which the axis does not go counts as 0 there. When s has
-    changed by 1 since the last summation, the axis that is added to first (but not in order
-    simultaneous) adds the mean of both scales, 3/2 or 3/4 of its increment, so that it stays half a
-    summation before the other one. Lines need no such thing, and on circles, where s goes to and
-    fro, what is left out comes back; there the points are those of the circular interpolator.
+    has its top bit set. But the scale s does not rise within a block, while both axes go (not in
+    order simultaneous, and not on circles): so an ellipse comes to one scale, with which it does
+    not drift. When s falls by 1 the axis that is added to first adds the mean of both scales, 3/2
+    of its increment, so that it stays half a summation before the other one. On circles s goes to
+    and fro, and what the mean leaves out comes back: there the points are those of the circular
+    interpolator. A derivative of which the axis does not go counts as 0.
 
     Registers: P1, P2 = x, y; GX, GY; SX, SY; P3, P4 = steps left of x and y in this piece (in the
     last one those to the end, before it those to the edge of the coordinates); A…E; XT, YT =
@@ -225,6 +226,7 @@ class Conic(Part):
         self.adders = tuple(StepAdder(bits + 1, bits - 1 + guard) for _ in range(2))
         lanes = zip(("gx", "gy", "2a", "b", "2c"), "xyzab", strict=True)
         self.intermediates = {
+            **({"limit": self.normalizer.limit} if self.ordered else {}),
             "places": self.normalizer.places,
             **{f"scaled_{name}": self.normalizer.normalized[lane] for name, lane in lanes},
             **{
@@ -495,26 +497,33 @@ class Conic(Part):
             m.d.comb += [swap.eq(~x_first), later.change.eq(Mux(opposite, -cross, cross))]
             if self.order == "implicit":
                 m.d.comb += later.own.eq(Mux(opposite, -big_b, big_b))
-            self._centre(m, normalizer.places, Mux(swap, velocity["y"], velocity["x"]), add)
+            self._centre(m, Mux(swap, velocity["y"], velocity["x"]), able["x"] & able["y"], add)
         return {
             "x": Mux(swap, later.step[0], earlier.step[0]),
             "y": Mux(swap, earlier.step[0], later.step[0]),
         }
 
-    def _centre(self, m: Module, places, velocity, add) -> None:
-        """Sum the first axis from the middle of the last summation to the middle of this one."""
+    def _centre(self, m: Module, velocity, both, add) -> None:
+        """Limit the scale, and sum the first axis from the middle of a summation to the next one's.
+
+        The scale falls where the curve is faster and does not rise again, so that ellipses come to
+        one scale, with which they do not drift. A single axis has no ratio to keep.
+        """
         a, b, c = (self.coefficients[k] for k in "abc")
-        circle, line = Signal(), Signal()
-        m.d.comb += [circle.eq((b == 0) & (a == c)), line.eq(circle & (a == 0))]
+        limit, places = self.normalizer.limit, self.normalizer.places
         change = self.adders[0].change
+        circle, line, none = Signal(), Signal(), ~Const(0, len(limit))
+        m.d.comb += [
+            circle.eq((b == 0) & (a == c)),
+            line.eq(circle & (a == 0)),
+            limit.eq(Mux(self.fresh | circle | ~both, none, self.scale)),
+        ]
         with m.If(self.fresh):
             if self.preload == "half":
                 m.d.comb += change.eq(Mux(line, 0, -(velocity >> 1)))
-        with m.Elif(~circle & (self.scale == places + 1)):
+        with m.Elif(limit == places + 1):
             m.d.comb += change.eq(velocity >> 1)
-        with m.Elif(~circle & (self.scale + 1 == places)):
-            m.d.comb += change.eq(-(velocity >> 2))
         with m.If(self.uu.load):
             m.d.sync += self.fresh.eq(1)
         with m.Elif(add):
-            m.d.sync += [self.fresh.eq(0), self.scale.eq(places)]
+            m.d.sync += [self.fresh.eq(0), self.scale.eq(Mux(both, places, none))]

@@ -3,7 +3,7 @@
 from functools import reduce
 from operator import or_
 
-from amaranth import Module, Shape, Signal
+from amaranth import Const, Module, Shape, Signal
 from amaranth.lib.wiring import In, Out
 
 from discreta.hdl.contract import Part, check_axes, check_width, per_axis
@@ -21,7 +21,8 @@ class Normalizer(Part):
     Built of ⌈log2 n⌉ stages; the stage of 2^k shifts by 2^k places when the top 2^k bits of every
     axis are zero.
 
-    ``places`` is s (all ones when the increments are all zero).
+    ``places`` is s (all ones when the increments are all zero). ``limit``, if it is driven, is the
+    most that s may be.
 
     With ``signed`` the increments are numbers with a sign, the stages look at the bits that repeat
     the sign, and the top bit in question is the one below it.
@@ -52,7 +53,12 @@ class Normalizer(Part):
         layout = per_axis(axes, Shape(width, signed))
         stages = (width - 1).bit_length()
         super().__init__(
-            {"increments": In(layout), "normalized": Out(layout), "places": Out(stages)}
+            {
+                "increments": In(layout),
+                "limit": In(stages, init=(1 << stages) - 1),
+                "normalized": Out(layout),
+                "places": Out(stages),
+            }
         )
         self.width = width
         self.axes = axes
@@ -63,6 +69,8 @@ class Normalizer(Part):
         m = Module()
         letters = list(per_axis(self.axes, self.width).members)
         values = {letter: self.increments[letter] for letter in letters}
+        # As long as the places so far are those of the limit it decides on the next stage too.
+        tight = Const(1, 1)
         for k in reversed(range(len(self.places))):
             places = 1 << k
             shape = Shape(self.width, self.signed)
@@ -76,7 +84,11 @@ class Normalizer(Part):
                 )
             else:
                 tops = (values[letter][self.width - places :] for letter in letters)
-            m.d.comb += [free.eq(reduce(or_, tops) == 0), self.places[k].eq(free)]
+            m.d.comb += [
+                free.eq((reduce(or_, tops) == 0) & (~tight | self.limit[k])),
+                self.places[k].eq(free),
+            ]
+            tight &= free == self.limit[k]
             for letter in letters:
                 with m.If(free):
                     m.d.comb += stage[letter].eq(values[letter] << places)

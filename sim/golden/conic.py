@@ -275,7 +275,14 @@ class Conic:
         a, b, c = (state[k] for k in "abc")
         # An axis that does not go must not hold the other one up.
         going = [where(able["y"], state["gx"], 0), where(able["x"], state["gy"], 0)]
-        scaled, places = self._scaled([*going, 2 * a, b, 2 * c])
+        none = 2 ** (self.bits - 1).bit_length() - 1
+        limit: Value = none
+        if self.ordered:
+            both = able["x"] & able["y"]
+            circle = equal(b, 0) & equal(a, c)
+            free = state["fresh"] | circle | negate(both)
+            limit = tell("limit", where(free, none, state["scale"]))
+        scaled, places = self._scaled([*going, 2 * a, b, 2 * c], limit)
         places = tell("places", places)
         names = ("gx", "gy", "2a", "b", "2c")
         gx, gy, a2, b1, c2 = (tell(f"scaled_{k}", v) for k, v in zip(names, scaled, strict=True))
@@ -289,7 +296,7 @@ class Conic:
         for which, x_now in (("first", x_first), ("second", negate(x_first))):
             speed = tell(f"{which}_velocity", where(x_now, velocity["x"], velocity["y"]))
             if which == "first" and self.ordered:
-                change = self._centred(state, speed, places)
+                change = self._centred(state, speed, places, limit)
             change = tell(f"{which}_change", change)
             total = tell(f"{which}_total", where(x_now, state["sx"], state["sy"]) + speed + change)
             down = where(x_now, piece["x"], piece["y"])
@@ -314,7 +321,7 @@ class Conic:
 
         if self.ordered:
             after["fresh"] = where(sums, 0, state["fresh"])
-            after["scale"] = where(sums, places, state["scale"])
+            after["scale"] = where(sums, where(both, places, none), state["scale"])
         hit = {}
         for k, now in (("x", x_first), ("y", negate(x_first))):
             first, second = (
@@ -324,24 +331,23 @@ class Conic:
             hit[k] = where(now, *hits)
         return hit
 
-    def _centred(self, state: State, speed: Value, places: Value) -> Value:
+    def _centred(self, state: State, speed: Value, places: Value, limit: Value) -> Value:
         """Give what is added to the first axis's speed, half a summation before the second's.
 
         So it is summed from the middle of the last summation to the middle of this one, and adds
         the mean of both scales: half of this one at first, 3/2 of it when the last one was twice
-        as large, 3/4 when it was half. Neither axis of a straight line waits for the other; and on
-        circles only the first increment is halved.
+        as large. Neither axis of a straight line waits for the other.
         """
-        circle = equal(state["b"], 0) & equal(state["a"], state["c"])
-        line = circle & equal(state["a"], 0)
+        line = equal(state["a"], 0) & equal(state["b"], 0) & equal(state["c"], 0)
         at_first = where(line, 0, 0 - (speed >> 1)) if self.preload == "half" else 0
-        longer = equal(state["scale"], places + 1)
-        shorter = equal(state["scale"] + 1, places)
-        later = where(longer, speed >> 1, where(shorter, 0 - (speed >> 2), 0))
-        return where(state["fresh"], at_first, where(circle, 0, later))
+        later = where(equal(limit, places + 1), speed >> 1, 0)
+        return where(state["fresh"], at_first, later)
 
-    def _scaled(self, values: list[Value]) -> tuple[list[Value], Value]:
-        """Shift numbers left together until one would lose its sign; give also how many places."""
+    def _scaled(self, values: list[Value], limit: Value) -> tuple[list[Value], Value]:
+        """Shift numbers left together, until one would lose its sign or the limit is reached.
+
+        Give also how many places.
+        """
         total: Value = 0
         places = 1
         while 2 * places < self.bits:
@@ -351,6 +357,7 @@ class Conic:
             small: Value = 1
             for value in values:
                 small = small & negate(less(value, -edge)) & less(value, edge)
+            small = small & negate(less(limit, total + places))
             values = [where(small, value << places, value) for value in values]
             total = total + where(small, places, 0)
             places //= 2
