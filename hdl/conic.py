@@ -521,7 +521,7 @@ class Conic(Part):
         with m.If(self.fresh):
             if self.preload == "half":
                 m.d.comb += change.eq(Mux(line, 0, -(velocity >> 1)))
-        with m.Elif(limit == places + 1):
+        with m.Elif((limit != none) & (limit == places + 1)):
             m.d.comb += change.eq(velocity >> 1)
         with m.If(self.uu.load):
             m.d.sync += self.fresh.eq(1)

@@ -58,6 +58,11 @@ class Conic:
         return 2 ** (self.bits - 1 + self.guard)
 
     @property
+    def no_limit(self) -> int:
+        """What stands for no limit of the scale: as many places as there are numbers for."""
+        return 2 ** (self.bits - 1).bit_length() - 1
+
+    @property
     def initial_sum(self) -> int:
         """What the summators start from when their axis rises."""
         return {"zero": 0, "half": self.modulus // 2}[self.preload]
@@ -275,10 +280,10 @@ class Conic:
         a, b, c = (state[k] for k in "abc")
         # An axis that does not go must not hold the other one up.
         going = [where(able["y"], state["gx"], 0), where(able["x"], state["gy"], 0)]
-        none = 2 ** (self.bits - 1).bit_length() - 1
+        none = self.no_limit
         limit: Value = none
+        both = able["x"] & able["y"]
         if self.ordered:
-            both = able["x"] & able["y"]
             circle = equal(b, 0) & equal(a, c)
             free = state["fresh"] | circle | negate(both)
             limit = tell("limit", where(free, none, state["scale"]))
@@ -340,7 +345,8 @@ class Conic:
         """
         line = equal(state["a"], 0) & equal(state["b"], 0) & equal(state["c"], 0)
         at_first = where(line, 0, 0 - (speed >> 1)) if self.preload == "half" else 0
-        later = where(equal(limit, places + 1), speed >> 1, 0)
+        longer = equal(limit, places + 1) & negate(equal(limit, self.no_limit))
+        later = where(longer, speed >> 1, 0)
         return where(state["fresh"], at_first, later)
 
     def _scaled(self, values: list[Value], limit: Value) -> tuple[list[Value], Value]:
