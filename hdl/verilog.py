@@ -84,7 +84,9 @@ _MEANINGS = {
     "blocks_turns": "block: changes of direction of an axis on the way",
     **{f"blocks_{letter}": f"block: coefficient {letter.upper()}" for letter in "abcde"},
     "error": "why a block was not run; "
-    + ", ".join(f"{code.value} {code.name}" for code in ErrorCode if code.value),
+    + ", ".join(
+        f"{code.value} {code.name}" for code in ErrorCode.__members__.values() if code.value
+    ),
 }
 
 # What stands before the name of a field, by the group of ports it belongs to.

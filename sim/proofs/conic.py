@@ -17,6 +17,7 @@ Notation: P and Q are 2A and B of GX, B and 2C of GY, R is D or E; dx and dy are
 clock; s the power of two of its scale; M = 2^(2n + 6 + g). The pieces of a curve lie between two
 changes of direction of an axis. An axis goes when its velocity, −GY or GX and clockwise the
 opposite, leads in the direction of the piece, it has steps left, and it is not ``backward``.
+A limit of s of all ones is none.
 """
 
 from collections.abc import Iterator
@@ -63,6 +64,8 @@ class _Registers:
         self.width = n = golden.width
         self.modulus = golden.modulus
         self.wide = golden.bits + golden.guard + 6
+        #: The limit of s that is none.
+        self.unlimited = self.number(golden.no_limit)
         self.last_tick = n + 3
         self.ranges: list[z3.BoolRef] = []
         kinds = golden.registers()
@@ -109,6 +112,7 @@ class _Registers:
             for a, (_, left, *_) in AXES.items()
         }
         self.dead = z3.Not(z3.Or(*self.goes.values()))
+        self.both = z3.And(*self.goes.values())
         self.x_speeds_up = z3.Xor(z3.Xor(self.down["x"], self.down["y"]), state["clockwise"] == 1)
         slow_leads = z3.If(self.x_speeds_up, leads["y"], leads["x"])
         self.clock = z3.And(self.running, self.free)
@@ -126,6 +130,8 @@ class _Registers:
         """Give the width in bits of every value between the registers and whether it is signed."""
         bits, sum_bits = self.golden.bits, self.golden.bits + self.golden.guard
         kinds = {"places": ((bits - 1).bit_length(), False)}
+        if self.golden.ordered:
+            kinds = {"limit": kinds["places"]} | kinds
         kinds |= {f"scaled_{k}": (bits, True) for k in LANES}
         for which in ("first", "second"):
             kinds |= {f"{which}_{k}": (bits + 1, True) for k in ("velocity", "change", "own")}
@@ -571,19 +577,25 @@ class _Registers:
             facts.append(z3.Implies(greater, _size(lanes[k]) > _size(lanes[g])))
         return facts
 
+    def limit(self) -> Value:
+        """Give the most that s may be: what it was, while both axes go and not on circles."""
+        state = self.state
+        circle = z3.And(state["b"] == 0, state["a"] == state["c"])
+        free = z3.Or(state["fresh"] == 1, circle, z3.Not(self.both))
+        return z3.If(free, self.unlimited, state["scale"])
+
     def first_change(self) -> Value:
         """Give what is added besides its velocity to the axis that is added to first."""
-        zero, golden, state = self.number(0), self.golden, self.state
+        zero, golden, state, made = self.number(0), self.golden, self.state, self.made
         if not golden.ordered:
             return zero
         # The mean of the last summation's scale and this one's; of no scale at all it is half.
-        v, places = self.made["first_velocity"], self.made["places"]
-        change = z3.If(state["scale"] == places + 1, v >> 1, zero)
-        change = z3.If(state["scale"] == places - 1, -(v >> 2), change)
-        round_one = z3.And(state["b"] == 0, state["a"] == state["c"])
-        straight = z3.And(round_one, state["a"] == 0)
+        v = made["first_velocity"]
+        straight = z3.And(*(state[k] == 0 for k in "abc"))
         first = z3.If(straight, zero, -(v >> 1)) if golden.preload == "half" else zero
-        return z3.If(state["fresh"] == 1, first, z3.If(round_one, zero, change))
+        limited = made["limit"] != self.unlimited
+        fell = z3.And(limited, made["limit"] == made["places"] + 1)
+        return z3.If(state["fresh"] == 1, first, z3.If(fell, v >> 1, zero))
 
     def _summed(self) -> dict[str, Value]:
         """Give what the summators should make, each value from those before it."""
@@ -638,13 +650,16 @@ class _Registers:
         additions = [
             (made[f"{which}_velocity"], made[f"{which}_change"]) for which in ("first", "second")
         ]
+        limited = [made["limit"] == self.limit()] if golden.ordered else []
         linked = [made[name] == value for name, value in self.links.items()]
         scaled = {k: told[f"scaled_{k}"] for k in LANES}
         top = 2 ** (golden.bits - 2)
-        nothing = z3.And(*(lane == 0 for lane in lanes.values()))
-        greatest = z3.Or(nothing, *(z3.Or(v >= top, v < -top) for v in scaled.values()))
+        # All ones, the greatest of all, when all are 0.
+        limit, places = made.get("limit", self.unlimited), told["places"]
+        full = (z3.Or(v >= top, v < -top) for v in scaled.values())
 
         x_first = self.x_speeds_up if golden.ordered else z3.BoolVal(True)
+        zero, halved = self.number(0), golden.ordered and golden.initial_sum > 0
         live: dict[str, z3.BoolRef] = {}
         forwards: dict[str, z3.BoolRef] = {}
         hang: dict[str, z3.BoolRef] = {}
@@ -657,9 +672,9 @@ class _Registers:
             down, goes = state[f"direction_{a}"] == 1, self.goes[a]
             added = z3.If(first, *(velocity + change for velocity, change in additions))
             reached = z3.If(first, made["first_total"], made["second_total"])
-            less = z3.And(first, self.first_change() != 0, added == 0)
+            nothing = z3.And(first, z3.BoolVal(halved), state.get("fresh", zero) == 1, added == 0)
             forwards[f"{a} forwards"] = z3.Implies(
-                goes, z3.Or(less, z3.If(down, added < 0, added > 0))
+                goes, z3.Or(nothing, z3.If(down, added < 0, added > 0))
             )
             hang[f"{a} below a carry"] = z3.Implies(goes, z3.If(down, reached >= 0, reached < m))
             hang[total] = z3.Implies(
@@ -669,9 +684,7 @@ class _Registers:
         hang["all other registers"] = self.kept(*CHANGING)
         hang["one goes"] = z3.Or(*self.goes.values())
         if golden.ordered:
-            live["scale"] = after["scale"] == made["places"]
-            live["fresh"] = after["fresh"] == 0
-            hang |= {name: live[name] for name in ("scale", "fresh")}
+            hang |= {"fresh": after["fresh"] == 0, "scale": after["scale"] == self.kept_scale()}
         which = {
             "implicit": ", of the axis that slows down with GX and GY as the steps leave them",
             "alternated": ", of the axis that slows down with the other one's new coordinate",
@@ -680,16 +693,22 @@ class _Registers:
         sums = [
             self.obligation(
                 "scale: 0 or GX, 0 or GY, 2A, B, 2C times one power of two 2^s, the greatest that "
-                "loses no bit",
+                "loses no bit" + (", of those up to the limit" if golden.ordered else ""),
                 [],
                 {
                     k: z3.And(
-                        scaled[k] == lanes[k] << told["places"],
-                        scaled[k] >> told["places"] == lanes[k],
+                        scaled[k] == lanes[k] << places,
+                        scaled[k] >> places == lanes[k],
                     )
                     for k in LANES
                 }
-                | {"greatest": greatest}
+                | {
+                    "limited": places <= limit,
+                    "greatest": z3.Or(places == limit, *full),
+                    "none just of nothing": z3.Implies(
+                        z3.Or(*(lane != 0 for lane in lanes.values())), places < self.unlimited
+                    ),
+                }
                 | {
                     "all fit": z3.And(
                         *(self.fits(name, told[name]) for name in made if name not in self.links)
@@ -703,7 +722,7 @@ class _Registers:
                 {
                     name: told[name] == value
                     for name, value in self.links.items()
-                    if name != "first_change"
+                    if name != "first_change" or not golden.ordered
                 }
                 | {"all fit": z3.And(*(self.fits(name, told[name]) for name in self.links))}
                 | {name: z3.Implies(self.live, fact) for name, fact in live.items()},
@@ -712,7 +731,7 @@ class _Registers:
                 "no hang: every clock of a block whose step does not wait turns an axis round, "
                 "puts out a step, or leaves all but the sums as they are; then every axis that "
                 "goes adds at least 1 in its direction, below a carry"
-                + (", or at least 0 where s is not what it was" if golden.ordered else ""),
+                + (", or at least 0 in the first of a block" if halved else ""),
                 [*self.everything, self.clock],
                 {
                     "turn": z3.Implies(self.turn, after["turns"] == state["turns"] - 1),
@@ -729,29 +748,56 @@ class _Registers:
                     for name, fact in hang.items()
                 },
             ),
-            self._inside([*scale, *linked]),
+            self._inside([*scale, *limited, *linked]),
         ]
-        if golden.ordered:
-            half = ", at the very first half" if golden.initial_sum else ""
-            sums.append(
-                self.obligation(
-                    "mean scale: where s falls or rises by 1 the axis that speeds up gains 3/2 or "
-                    f"3/4 of that (not on circles){half} (not on lines); never the opposite",
-                    [],
-                    {
-                        "mean": told["first_change"] == self.first_change(),
-                        "never the opposite": z3.Implies(
-                            made["first_velocity"] >= 0,
-                            made["first_velocity"] + self.first_change() >= 0,
-                        ),
-                        "nor downwards": z3.Implies(
-                            made["first_velocity"] <= 0,
-                            made["first_velocity"] + self.first_change() <= 0,
-                        ),
-                    },
-                )
-            )
-        return sums
+        return [*sums, *(self._limits() if golden.ordered else [])]
+
+    def kept_scale(self) -> Value:
+        """Give what a summation leaves of its scale: nothing if only one axis goes."""
+        return z3.If(self.both, self.made["places"], self.unlimited)
+
+    def _limits(self) -> list[Obligation]:
+        """What the scale of a summation has to do with that of the one before."""
+        state, after, made, told = self.state, self.after, self.made, self.told
+        limited = told["limit"] != self.unlimited
+        never = z3.Implies(
+            z3.And(
+                self.sums, limited, made["limit"] == told["limit"], made["places"] <= told["limit"]
+            ),
+            z3.And(after["scale"] <= state["scale"], after["scale"] == made["places"]),
+        )
+        v, changed = made["first_velocity"], made["first_velocity"] + self.first_change()
+        half = ", half of its very first one (not on lines)" if self.golden.initial_sum else ""
+        return [
+            self.obligation(
+                "limit: none in the first summation of a block, on circles (B = 0, A = C) and "
+                "where only one axis goes or went last; else s of the last summation: while both "
+                "axes go s never rises",
+                [*self.known["block"].values(), *self.carries],
+                {
+                    "limit": told["limit"] == self.limit(),
+                    "fits": self.fits("limit", told["limit"]),
+                    "first": z3.Implies(self.load, after["fresh"] == 1),
+                    "then not": z3.Implies(self.sums, after["fresh"] == 0),
+                    "kept": z3.Implies(self.sums, after["scale"] == self.kept_scale()),
+                    "else both stay": z3.Implies(
+                        z3.Not(z3.Or(self.load, self.sums)),
+                        z3.And(*(after[k] == state[k] for k in ("fresh", "scale"))),
+                    ),
+                    "never rises": never,
+                },
+            ),
+            self.obligation(
+                "mean scale: the axis that speeds up gains 3/2 of its increment where s falls to 1 "
+                f"below a limit{half}, and just the increment elsewhere; never the opposite",
+                [],
+                {
+                    "mean": told["first_change"] == self.first_change(),
+                    "never the opposite": z3.Implies(v >= 0, changed >= 0),
+                    "nor downwards": z3.Implies(v <= 0, changed <= 0),
+                },
+            ),
+        ]
 
     def _inside(self, made: list) -> Obligation:
         """State where SX and SY never leave 0 … M − 1, so that nothing is ever limited."""
