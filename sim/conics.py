@@ -21,7 +21,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import pairwise
 
 import numpy as np
 
@@ -32,15 +31,16 @@ from discreta.sim.points import BadInputError, check_coordinates, give_width, sa
 __all__ = [
     "KINDS",
     "ConicBlock",
+    "Motion",
     "check_block",
     "curve_near",
     "curve_points",
     "distance",
     "ellipse",
     "from_coefficients",
+    "motion",
     "parabola",
     "random_blocks",
-    "travel",
 ]
 
 Number = int | float | Fraction
@@ -413,15 +413,36 @@ def _extreme(
     axis : array of int
         0 to 3: +x, +y, −x, −y. There is such a place, or what is given is no number.
     """
-    a, b, c, gx, gy = local
     nx, ny = (axis == 0) * 1.0 - (axis == 2), (axis == 1) * 1.0 - (axis == 3)
+    return _place(local, curl, bend, nx, ny)[0]
+
+
+def _place(
+    local: tuple[np.ndarray, ...],
+    curl: np.ndarray,
+    bend: np.ndarray,
+    nx: np.ndarray,
+    ny: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Give where curves are when their gradient has a direction; and sin(ωt)/ω and cos(ωt) there.
+
+    Parameters
+    ----------
+    local, curl, bend
+        As for :func:`_extreme`.
+    nx, ny : arrays of float
+        The direction, of any length.
+    """
+    a, b, c, gx, gy = local
     with np.errstate(divide="ignore", invalid="ignore"):
-        length = np.sqrt(bend / np.where(axis % 2, a, c))
+        # Q is the same everywhere: the gradient has only one size for a direction.
+        length = np.sqrt(bend / (a * ny * ny - b * nx * ny + c * nx * nx))
         nx, ny = nx * length, ny * length
         s = (gx * ny - gy * nx) / (2 * bend)
         cos = (2 * c * gx * nx - b * (gx * ny + gy * nx) + 2 * a * gy * ny) / (2 * bend)
         k = np.where(cos > -0.5, s * s / (1 + cos), (1 - cos) / curl)
-        return np.stack([k * (b * gy - 2 * c * gx) - s * gy, k * (b * gx - 2 * a * gy) + s * gx])
+        place = np.stack([k * (b * gy - 2 * c * gx) - s * gy, k * (b * gx - 2 * a * gy) + s * gx])
+    return place, s, cos
 
 
 def _quadrant(gx: np.ndarray, gy: np.ndarray, *, after: bool) -> np.ndarray:
@@ -1082,40 +1103,116 @@ def curve_near(block: Sequence[int] | np.ndarray, point: np.ndarray, reach: floa
     return np.concatenate(pieces)[:-1]
 
 
-def travel(blocks: np.ndarray, width: int) -> np.ndarray:
-    """Give how far x and y go on the curves of blocks, both together, in steps, shape (blocks,).
+@dataclass(frozen=True)
+class Motion:
+    """How far and how long curves run: what the clocks of their blocks follow from.
 
-    Quick, for many blocks at once, and only as exact as it takes to judge how long they run.
+    Attributes
+    ----------
+    steps : array of float, shape (blocks,)
+        ∫max(|dx|, |dy|): steps of the axis that moves faster.
+    time : array of float, shape (blocks,)
+        Of the motion x' = −Gy, y' = Gx.
+    first, largest : array of float, shape (blocks,)
+        The larger one of |Gx| and |Gy| at the start, and where it is largest on the way.
+    smallest : array of float, shape (blocks,)
+        √(Gx² + Gy²) where it is smallest on the way; of an ellipse where it is smallest at all.
+    """
+
+    steps: np.ndarray
+    time: np.ndarray
+    first: np.ndarray
+    largest: np.ndarray
+    smallest: np.ndarray
+
+
+def motion(blocks: np.ndarray) -> Motion:
+    """Work out how curves run, quick, for many blocks at once, shape (blocks, 11).
+
+    It is as exact as it takes to judge how long they run. What does not lead from its start to its
+    end is not a number, or any.
+    """
+    a, b, c, d, e, x, y, end_x, end_y, clockwise, turns = blocks.T
+    mirror = np.where(clockwise == 1, -1, 1)
+    whole = (a, mirror * b, c, 2 * a * x + b * y + d, mirror * (b * x + 2 * c * y + e))
+    curl = np.asarray(4 * whole[0] * whole[2] - whole[1] ** 2, dtype=float)
+    # Its parts may be much larger than Q.
+    a, b, c, gx, gy = (np.asarray(row, dtype=np.longdouble) for row in whole)
+    bend = np.asarray(a * gy * gy - b * gx * gy + c * gx * gx, dtype=float)
+    local = a, b, c, gx, gy = tuple(row.astype(float) for row in (a, b, c, gx, gy))
+    u, v = (end_x - x).astype(float), (mirror * (end_y - y)).astype(float)
+    straight, closed = (a == 0) & (b == 0) & (c == 0), curl > 0
+    with np.errstate(all="ignore"):
+        ex, ey = gx + 2 * a * u + b * v, gy + b * u + 2 * c * v
+        # The end is not quite on the curve.
+        for _ in range(4):
+            off = (u * (a * u + b * v + gx) + v * (c * v + gy)) / (ex * ex + ey * ey)
+            u, v = u - off * ex, v - off * ey
+            ex, ey = gx + 2 * a * u + b * v, gy + b * u + 2 * c * v
+        swept = (np.arctan2(ey, ex) - np.arctan2(gy, gx)) % (2 * np.pi)
+        rounds = np.where(straight, 0, np.rint((turns - swept / (np.pi / 2)) / 4))
+        bent = _faster_steps(local, curl, bend, swept)
+        steps = np.where(straight, np.fmax(np.abs(u), np.abs(v)), bent)
+        around = rounds > 0
+        of_these = (tuple(row[around] for row in local), curl[around], bend[around])
+        steps[around] += rounds[around] * _faster_steps(*of_these, 2 * np.pi)
+
+        _, sine, cosine = _place(local, curl, bend, ex, ey)
+        omega = np.sqrt(np.abs(curl))
+        angle = np.arctan2(omega * sine, cosine)
+        # Less than half a turn from what the gradient has turned by, which knows of a whole one.
+        angle += 2 * np.pi * np.rint((swept - angle) / (2 * np.pi)) + 2 * np.pi * rounds
+        time = np.select(
+            [straight, closed, curl == 0],
+            [(gx * v - gy * u) / (gx * gx + gy * gy), angle / omega, sine],
+            np.arcsinh(omega * sine) / omega,
+        )
+
+        # |G|, |Gx| and |Gy| are convex but on ellipses, where both of these go up and down.
+        first = np.fmax(np.abs(gx), np.abs(gy))
+        largest = np.fmax(first, np.fmax(np.abs(ex), np.abs(ey)))
+        for h, before, after in (
+            (a, gx * (b * gx - 2 * a * gy), ex * (b * ex - 2 * a * ey)),
+            (c, gy * (2 * c * gx - b * gy), ey * (2 * c * ex - b * ey)),
+        ):
+            # Half a turn leads from a largest to a largest, smallest or none in the middle.
+            rises, falls = before > 0, after < 0
+            either = (angle >= np.pi / 2) & (rises | falls)
+            passed = closed & ((angle >= np.pi) | either | (rises & falls))
+            largest = np.where(passed, np.fmax(largest, np.sqrt(4 * h * bend / curl)), largest)
+        before, after = (
+            b * (kx * kx - ky * ky) + 2 * (c - a) * kx * ky for kx, ky in ((gx, gy), (ex, ey))
+        )
+        smallest = np.fmin(np.hypot(gx, gy), np.hypot(ex, ey))
+        inside = ~straight & (closed | ((before < 0) & (after > 0)))
+        least = np.sqrt(2 * bend / (a + c + np.hypot(a - c, b)))
+        smallest = np.where(inside, np.fmin(smallest, least), smallest)
+    return Motion(steps, time, first, largest, smallest)
+
+
+def _faster_steps(
+    local: tuple[np.ndarray, ...], curl: np.ndarray, bend: np.ndarray, swept: np.ndarray | float
+) -> np.ndarray:
+    """Give the steps of the axis that moves faster until the gradient has turned by an angle.
+
+    Where the gradient is nearer to the y axis x is the faster one, for a right angle, and goes one
+    way all the time. So only the points between are needed.
 
     Parameters
     ----------
-    blocks : array of int64, shape (blocks, 11)
-    width : int
-        No curve goes beyond the coordinates that it has.
+    local, curl, bend
+        As for :func:`_extreme`.
+    swept : array of float, or one
+        The angle, up to 2π.
     """
-    a, b, c, d, e, x, y, end_x, end_y, clockwise, turns = blocks.T
-    mirror = np.where(clockwise, -1, 1)
-    gx, gy = 2 * a * x + b * y + d, mirror * (b * x + 2 * c * y + e)
-    curl, begins = 4 * a * c - b * b, _quadrant(gx, gy, after=True)
-    local = tuple(np.asarray(row, dtype=np.longdouble) for row in (a, mirror * b, c, gx, gy))
-    a, b, c, gx, gy = local
-    bend = a * gy * gy - b * gx * gy + c * gx * gx
-    start, room = np.stack([x, mirror * y]), 2.0**width
-    goal = np.stack([end_x, mirror * end_y])
-
-    def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-        return np.abs(one - other).sum(axis=0)
-
-    # Where the changes of direction are; from the fifth on, where they were before.
-    places = [start + _extreme(local, curl, bend, (begins + k) % 4) for k in range(1, 5)]
-    places = [np.clip(np.nan_to_num(place, nan=room), -room, room) for place in places]
-    around = sum(apart(one, other) for one, other in pairwise([*places, places[0]]))
-    rounds = np.fmax(turns - 1, 0) // 4
-    way, here = rounds * around, start
-    for k, place in enumerate(places):
-        passed = turns - 4 * rounds > k
-        way, here = way + np.where(passed, apart(here, place), 0), np.where(passed, place, here)
-    return np.asarray(way + apart(here, goal), dtype=float)
+    begin = np.arctan2(local[4], local[3])
+    diagonal = (np.pi / 4 - begin) % (np.pi / 2)
+    steps, before = 0, 0
+    for right_angles in range(5):
+        way = begin + np.minimum(diagonal + right_angles * np.pi / 2, swept)
+        place, _, _ = _place(local, curl, bend, np.cos(way), np.sin(way))
+        steps, before = steps + np.abs(place - before).max(axis=0), place
+    return np.asarray(steps)
 
 
 # Random blocks

@@ -8,7 +8,7 @@ import numpy as np
 
 from discreta.hdl.contract import MIN_WIDTH
 from discreta.sim.arcs import refusals, seen_from_center, swept
-from discreta.sim.conics import KINDS, ellipse, random_blocks
+from discreta.sim.conics import KINDS, ellipse, motion, random_blocks
 from discreta.sim.methods import Method
 
 __all__ = ["SAMPLE_BUDGET", "SEED", "WHOLE_BUDGET", "Group", "survey_groups", "whole_degrees"]
@@ -212,19 +212,24 @@ def _conic_groups(method: Method, width: int) -> list[Group]:
     groups = []
     for kind in KINDS:
         blocks = random_blocks(kind, width, _CURVES, np.random.default_rng(SEED))
-        lengths = _steps_of_conics(blocks)
-        summations = (2 << guard) * lengths
+        lengths, summations = _work_of_conics(blocks, guard)
         if summations.sum() > WHOLE_BUDGET:
             count = np.searchsorted(np.cumsum(summations), SAMPLE_BUDGET)
             blocks, lengths = blocks[:count], lengths[:count]
         title = f"a sample (seed {SEED}) of {len(blocks)} {kind}s"
         groups.append(Group(title, blocks, np.zeros(len(blocks), dtype=np.int64), lengths))
     blocks = _random_ellipses(width, _TEN_TURNS, full_turns=9)
-    lengths = _steps_of_conics(blocks)
-    count = np.searchsorted(np.cumsum((2 << guard) * lengths), SAMPLE_BUDGET)
+    lengths, summations = _work_of_conics(blocks, guard)
+    count = np.searchsorted(np.cumsum(summations), SAMPLE_BUDGET)
     title = f"ten turns of {count} ellipses"
     answers = np.zeros(count, dtype=np.int64)
     return [*groups, Group(title, blocks[:count], answers, lengths[:count])]
+
+
+def _work_of_conics(blocks: np.ndarray, guard: int) -> tuple[np.ndarray, np.ndarray]:
+    """Give the steps of the axis that moves faster, and the most summations that they may take."""
+    course = motion(blocks)
+    return course.steps, (2 << guard) * np.fmax(course.steps, course.time * course.largest)
 
 
 def _random_ellipses(width: int, count: int, *, full_turns: int) -> np.ndarray:
@@ -247,64 +252,6 @@ def _random_ellipses(width: int, count: int, *, full_turns: int) -> np.ndarray:
         )
         blocks.append(drawn.block)
     return np.array(blocks, dtype=np.int64)
-
-
-def _steps_of_conics(blocks: np.ndarray) -> np.ndarray:
-    """Give the steps of the axis that moves faster: ∫max(|dx|, |dy|) along the curves."""
-    a, b, c, d, e, x, y, end_x, end_y, clockwise, turns = blocks.T.astype(float)
-    mirror = np.where(clockwise == 1, -1, 1)
-    gx, gy = 2 * a * x + b * y + d, mirror * (b * x + 2 * c * y + e)
-    b, u, v = mirror * b, end_x - x, mirror * (end_y - y)
-    ex, ey = gx + 2 * a * u + b * v, gy + b * u + 2 * c * v
-    # The end is not quite on the curve.
-    for _ in range(4):
-        off = (u * (a * u + b * v + gx) + v * (c * v + gy)) / (ex * ex + ey * ey)
-        u, v = u - off * ex, v - off * ey
-        ex, ey = gx + 2 * a * u + b * v, gy + b * u + 2 * c * v
-    steps = np.maximum(np.abs(u), np.abs(v))
-    swept = (np.arctan2(ey, ex) - np.arctan2(gy, gx)) % (2 * pi)
-    rounds = np.rint((turns - swept / (pi / 2)) / 4)
-    bent = (a != 0) | (b != 0) | (c != 0)
-    whole = bent & (rounds != 0)
-    curves = np.stack([a, b, c, gx, gy])
-    steps[bent] = _steps_of_bends(curves[:, bent], swept[bent])
-    turn = np.full(np.count_nonzero(whole), 2 * pi)
-    steps[whole] += rounds[whole] * _steps_of_bends(curves[:, whole], turn)
-    return steps
-
-
-def _steps_of_bends(curves: np.ndarray, swept: np.ndarray) -> np.ndarray:
-    """Give the same from the starts on until the gradient's direction has turned by an angle.
-
-    Where the gradient is nearer to the y axis x is the faster one, for a right angle, and goes one
-    way all the time. So only the points between are needed.
-
-    Parameters
-    ----------
-    curves : array of float, shape (5, curves)
-        a, b, c, and Gx, Gy at the start; run counter-clockwise.
-    swept : array of float, shape (curves,)
-        The angle, up to 2π.
-    """
-    a, b, c, gx, gy = curves
-    bend, curl = a * gy * gy - b * gx * gy + c * gx * gx, 4 * a * c - b * b
-    first = np.arctan2(gy, gx)
-    diagonal = (pi / 4 - first) % (pi / 2)
-    steps, before = np.zeros(len(swept)), np.zeros((2, len(swept)))
-    for right_angles in (0, 1, 2, 3, 4):
-        # See discreta.sim.conics for the motion; G has only one size for a direction.
-        way = first + np.minimum(diagonal + right_angles * pi / 2, swept)
-        nx, ny = np.cos(way), np.sin(way)
-        nx, ny = np.sqrt(bend / (a * ny * ny - b * nx * ny + c * nx * nx)) * (nx, ny)
-        sine = (gx * ny - gy * nx) / (2 * bend)
-        cosine = (2 * c * gx * nx - b * (gx * ny + gy * nx) + 2 * a * gy * ny) / (2 * bend)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            verse = np.where(cosine > -0.5, sine**2 / (1 + cosine), (1 - cosine) / curl)
-        u = verse * (b * gy - 2 * c * gx) - sine * gy
-        v = verse * (b * gx - 2 * a * gy) + sine * gx
-        steps += np.abs((u, v) - before).max(axis=0)
-        before = np.stack([u, v])
-    return steps
 
 
 def whole_degrees(method: Method, width: int) -> list[Group]:

@@ -15,7 +15,7 @@ from discreta.hdl.conic import ORDERS as CONIC_ORDERS
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import MAX_WIDTH, Part
 from discreta.hdl.linear import Linear
-from discreta.sim.conics import travel
+from discreta.sim.conics import motion
 from discreta.sim.golden.circular import Circular as GoldenCircular
 from discreta.sim.golden.conic import Conic as GoldenConic
 from discreta.sim.golden.linear import Linear as GoldenLinear
@@ -125,22 +125,41 @@ def _circular_clocks(golden: GoldenCircular, blocks: np.ndarray) -> np.ndarray:
 #: beyond it the other one may be.
 _BESIDE, _LEFT, _BEYOND = 8, 4, 2
 
+#: How far beside the curve the gradient may be at its largest, in steps.
+_ASIDE = 2
+
 
 def _conic_clocks(golden: GoldenConic, blocks: np.ndarray) -> np.ndarray:
-    """The steps of the axis that moves faster, each in 2^(g + 1) clocks, and what may be slower.
+    """The motion's time by 2^(g + 1) of the largest gradient so far, and what may be slower.
 
-    The faster axis has half the modulus or more at every summation, as long as a step changes the
-    gradient by less than the gradient is: that is not so for an axis that goes to the end alone,
-    the other one having come there, or beyond.
+    A summation is h of the motion's time, M/h being 2^g to 2^(g + 1) times the largest one of |Gx|
+    and |Gy|: of all so far, or where the scale follows the gradient of those now. The time by the
+    gradient is then the steps of the faster axis.
     """
+    a, b, c, *_ = blocks.T
     pieces = 1 + blocks[:, 10]
+    course = motion(blocks)
     # An axis is up to some steps beside the curve where it turns; in order simultaneous each piece
     # leads farther out.
     beside = _BESIDE * pieces
+    steps = course.steps
     if golden.order == "simultaneous":
         beside = beside + 2 * pieces**2 / 2**golden.guard
-    steps = travel(blocks, golden.width) + beside + _alone(blocks)
-    return (steps * 2.0 ** (golden.guard + 1)).astype(np.int64) + pieces + golden.width + 10
+    else:
+        change = np.maximum.reduce([2 * np.abs(a), np.abs(b), 2 * np.abs(c)])
+        with np.errstate(invalid="ignore", over="ignore"):
+            largest = np.fmax(course.largest + _ASIDE * change, change)
+            kept = (b != 0) | (a != c)
+            steps = np.where(kept, course.time * largest, steps)
+            slow = largest / np.fmax(course.smallest, np.fmax(change, 1))
+            slow = np.fmin(slow, 2.0 ** (golden.width + 2))
+            beside = beside * np.where(kept, slow, 1)
+    # Whatever a block is: no axis goes beyond its coordinates, and of all ellipses in them whose
+    # radius of curvature is two steps or more the gradient is up to 2^(n/2) times its smallest.
+    most, none = (pieces * 2.0**bits for bits in (1.5 * golden.width + 3, golden.width + 2))
+    steps = np.where(steps >= 0, np.fmin(steps, most), none)
+    clocks = (steps + beside + _alone(blocks)) * 2.0 ** (golden.guard + 1)
+    return clocks.astype(np.int64) + pieces + golden.width + 10
 
 
 def _alone(blocks: np.ndarray) -> np.ndarray:
@@ -217,7 +236,7 @@ METHODS = {
             summary="any curve of the second order by cross-coupled summation of its derivatives "
             "(DDA)",
             error_bound="1.8 (default), 8.9 (lecture); measured at 8 bits",
-            clocks_per_step="5.5 (default), 1.4 (no guard bits)",
+            clocks_per_step="5.7 to 7.5 (default), 1.4 to 1.6 (lecture)",
             device=Conic,
             golden=GoldenConic,
             axes=(2,),

@@ -18,6 +18,7 @@ import numpy as np
 
 from discreta.sim.arcs import seen_from_center
 from discreta.sim.compiled import CompiledModel
+from discreta.sim.conics import motion
 from discreta.sim.contour import ArcContour, ConicContour, Contour, LineContour
 from discreta.sim.groups import SEED, Group
 from discreta.sim.methods import METHODS, Method
@@ -212,9 +213,18 @@ class _Conics:
     def clocks(self, method: Method, golden: Any, group: Group) -> np.ndarray:  # noqa: ARG002
         """Give 2^guard / ln 2 for every step of the faster axis, and the preparation.
 
-        A summation moves it by 2^−guard times ½ to 1, by the logarithm all of these alike.
+        A summation moves it by 2^−guard times ½ to 1, by the logarithm all of these alike; and by
+        less where the gradient was larger before, if the scale does not rise.
         """
-        return (group.lengths * 2**golden.guard / log(2)).astype(np.int64) + golden.width + 7
+        course, steps = motion(group.blocks), group.lengths
+        if golden.ordered:
+            a, b, c, *_ = group.blocks.T
+            # An ellipse soon has the scale of its largest gradient; elsewhere it is largest at an
+            # end.
+            closed = 4 * a * c > b * b
+            slow = course.time * np.where(closed, course.largest, course.first)
+            steps = np.where((b != 0) | (a != c), np.fmax(steps, slow), steps)
+        return (steps * 2**golden.guard / log(2)).astype(np.int64) + golden.width + 7
 
     def completing(self, seen: dict[str, np.ndarray]) -> np.ndarray:
         """Tell the clocks in which nothing that has steps left would move."""

@@ -507,8 +507,8 @@ def _sums(core: Conic) -> Value:
 
 
 @_conic({*ALL})
-def borrow_not_a_step(core: Conic) -> None:
-    """A borrow is put back into its sum like any other, but steps upwards."""
+def borrow_taken_for_a_carry(core: Conic) -> None:
+    """A borrow is a step upwards, and M is taken off the sum instead of added."""
     for adder in core.adders:
         _assign(adder, adder.step[1], 0)
 
@@ -522,7 +522,7 @@ def b_forgotten(core: Conic) -> None:
 
 @_conic({*ALL})
 def turns_not_counted(core: Conic) -> None:
-    """A change of direction leaves ``turns`` as it is: the last piece is never entered."""
+    """No change of direction is counted: the last piece is never entered."""
 
     def change(m: Module) -> None:
         with m.If(core.output.load & ~core.uu.load):
@@ -628,13 +628,14 @@ def preparation_not_reset(core: Conic) -> None:
 class _SideMisread(GoldenConic):
     """The mistake of :func:`side_misread`, made a second time."""
 
-    def step(self, state, inputs, *tell):
+    def step(self, state, inputs, tell=lambda _, value: value):
         misread = inputs | {"blocks_clockwise": inputs["blocks_clockwise"] ^ 1}
-        return super().step(state, misread, *tell)
+        return super().step(state, misread, tell)
 
 
-# A survey of conics tells the largest error, but there is no bound that it could be held to.
-@_conic({DOCUMENTS, PROMISES}, golden=_SideMisread)
+# A survey of conics tells the largest error, but there is no bound that it could be held to; and
+# what the promises say of a direction they say of the register.
+@_conic({DOCUMENTS}, golden=_SideMisread)
 def side_misread(core: Conic) -> None:
     """Device and golden model both take clockwise for counter-clockwise."""
 

@@ -80,7 +80,9 @@ def conic_steps(
     way = first_way(block)
     sums = [preset if w > 0 else modulus - 1 - preset for w in way]
     clock = width + 4
-    scale_before = 0
+    # The scale of the last summation of both axes, below which it stays; none counts for circles.
+    scale_before, fresh = 0, True
+    limited = order != "simultaneous" and (b != 0 or a != c)
 
     while True:
         clock += 1
@@ -96,9 +98,12 @@ def conic_steps(
         faster = 1 if (way[0] == way[1]) != bool(block[9]) else 0
         slower = 1 - faster
         gx, gy = derivatives(block, point)
+        most = scale_before if limited and all(able) and scale_before else largest
         scale = 1
         together = (gx * able[1], gy * able[0], 2 * a, b, 2 * c)
         while any(together) and all(-largest <= 2 * scale * g < largest for g in together):
+            if scale == most:
+                break
             scale *= 2
         if to_come and not (goes[slower] and any(able)):
             way[slower] = -way[slower]
@@ -117,14 +122,11 @@ def conic_steps(
                 increment = scale * velocity(block, at)[k]
                 if k == first and order != "simultaneous":
                     # It is kept half a summation before the other one.
-                    if scale_before == 0:
+                    if fresh:
                         if preload == "half" and (a or b or c):
                             increment -= increment // 2
-                    elif b or a != c:
-                        if scale_before == 2 * scale:
-                            increment += increment // 2
-                        elif 2 * scale_before == scale:
-                            increment -= increment // 4
+                    elif most == 2 * scale and most == scale_before:
+                        increment += increment // 2
                 total = sums[k] + increment
                 if total >= modulus if way[k] > 0 else total < 0:
                     point[k] += way[k]
@@ -133,7 +135,7 @@ def conic_steps(
                         total = sums[k] + scale * velocity(block, point)[k]
                     total -= way[k] * modulus
                 sums[k] = min(max(total, -2 * modulus), 2 * modulus - 1)
-        scale_before = scale
+        scale_before, fresh = scale if all(able) else 0, False
         if point != before:
             yield clock + 1, (point[0], point[1])
             if to_come <= 1 and point == end:

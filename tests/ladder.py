@@ -209,9 +209,12 @@ def _sound_arcs() -> np.ndarray:
     return np.array([*quarters, *_NAMED_ARCS, *sound])
 
 
-#: A turned ellipse almost all round.
+#: Over half a turned ellipse; a quarter whose end is a step beyond the curve; an arc at whose end
+#: one axis goes on alone.
 _NAMED_CONICS = [
-    (22, -17, 12, 0, 0, 7, 0, 7, 0, 0, 3),
+    (22, -17, 12, 0, 0, 7, 0, 0, 10, 0, 2),
+    (1, 0, 1, 0, 0, 4, 0, 0, 5, 0, 0),
+    (15, 0, 15, 138, 283, -4, -5, -7, -6, 0, 1),
 ]
 
 #: Wrong ends and turns: ends backward along x, and along y; and one in a corner, which ends there.
@@ -372,9 +375,10 @@ class _Device:
             for name, (_, signed) in kinds.items()
             if name in given
         ]
-        for name, (_, signed) in self._rtl.intermediates.items() if tell else ():
-            value = extend(own[name][1], signed, wide)
-            facts.append(tell(name, value) == value)
+        if tell is not None:
+            for name, (_, signed) in self._rtl.intermediates.items():
+                value = extend(own[name][1], signed, wide)
+                facts.append(tell(name, value) == value)
         self._clocks.append((facts, _clocks_of(given.values())))
         return {
             name: extend(own[symbol.format(name)][1], signed, wide)
@@ -433,7 +437,7 @@ def compiled(variant: Variant) -> str:
         variant.method, name=variant.name, device=lambda width, **_: variant.device(width)
     )
     # Some curves of each kind tell as much here as thousands.
-    with patch.object(survey_samples, "_CURVES", 300):
+    with patch.object(survey_samples, "_CURVES", 1000):
         groups = survey_groups(method, WIDTH)
     bound = method.bound(variant.golden(WIDTH))
     findings = []

@@ -20,7 +20,7 @@ SOME = {
     ("arc", "Verilator"): {"sound arc"},
     # The sound ones are proven and surveyed in tests of their own, and run in Verilator there.
     ("conic", "equivalence"): {"still axis holds up", "sharp not refused"},
-    ("conic", "promises"): {"b forgotten", "side misread"},
+    ("conic", "promises"): set(),
     ("conic", "compiled"): set(),
     ("conic", "Icarus"): {"sound conic", "own change forgotten", "preparation not reset"},
     ("conic", "Verilator"): set(),
@@ -31,7 +31,6 @@ FIRST_BROKEN = {
     ("sign as printed", "promises"): "invariant: to an axis P3 = P1 and P2 + P4 = L",
     ("way misread", "promises"): "accepted: ",
     ("rim misread", "promises"): "verdict: ",
-    ("b forgotten", "promises"): "derivatives: ",
 }
 
 JOBS = [

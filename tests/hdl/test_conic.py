@@ -218,10 +218,12 @@ def test_rejected_and_empty_blocks_move_nothing_and_the_next_runs():
         (1, 0, 1, -18, 18, 9, -9, 9, -9, 1, 0),  # empty, with nothing to say of its direction
         (3, -5, 2, 7, 36, 0, 0, -4, -4, 1, 2),  # |Gx| + |Gy| = 43, too, but A… = 10 needs 40
     ]
+    # |Gx| + |Gy| = 2^16, of which no bit may be lost; it has one step to go.
+    steep = (255, 255, 255, 9053, 9053, 31, 31, 30, 31, 0, 0)
     codes = [SHARP, SHARP, SHARP, 0, 0, 0]
     assert [fault(block) for block in still] == codes
     assert [is_empty(block) for block in still] == [False, False, False, True, True, False]
-    order = [QUARTER, *still[:2], BACK, still[3], still[2], QUARTER, still[4], BACK]
+    order = [QUARTER, *still[:2], BACK, still[3], still[2], steep, still[4], BACK]
     model = PysimModel(Conic(5), watch=("position_x", "position_y", "busy"))
     seen = model.run(np.array(order), 5000, until_answered=len(order), event_room=5000)
     answered = (column(seen.events, "done") | column(seen.events, "error")) != 0
@@ -231,7 +233,7 @@ def test_rejected_and_empty_blocks_move_nothing_and_the_next_runs():
     position, clock = None, 0
     for block, answer in zip(order, answers[:, 0].tolist(), strict=True):
         steps = seen.events[(seen.events[:, 0] >= clock) & (seen.events[:, 0] < answer)]
-        assert column(steps, "taken").any() == (block in (QUARTER, BACK))
+        assert column(steps, "taken").any() == (block in (QUARTER, BACK, steep))
         # The end of a curve, the start of an empty block; a rejected one leaves it alone.
         position = position if fault(block) else block[7:9]
         assert tuple(seen.watch[answer][:2].tolist()) == position

@@ -13,11 +13,12 @@ from discreta.sim.conics import (
     distance,
     ellipse,
     from_coefficients,
+    motion,
     parabola,
     random_blocks,
-    travel,
 )
 from discreta.sim.points import BadInputError
+from tests.conics import derivatives
 
 WIDTH = 12
 
@@ -404,7 +405,7 @@ def test_shapes_that_cannot_be_run_are_refused(make, message):
 # Random blocks, against the motion: nothing of it is used to make them
 
 
-def motion(block, total, count):
+def walk(block, total, count):
     """Give points and velocities at even times.
 
     (x, y, 1)' is a matrix times (x, y, 1): its power series, over and over.
@@ -438,14 +439,14 @@ def motion_to_end(block):
         speed = math.hypot(2 * a * x + b * y + d, b * x + 2 * c * y + e)
         total = math.hypot(end_x - x, end_y - y) / speed / 64
         for _ in range(60):
-            points, _ = motion(block, total, 1 << 11)
+            points, _ = walk(block, total, 1 << 11)
             off = np.hypot(*(points - (end_x, end_y)).T)
             last = int(np.argmin(off))
             if 0 < last < len(off) - 1 and off[last] < 1 + np.ptp(off[last - 1 : last + 2]):
                 total *= (last + 2) / len(off)
                 break
             total *= 2
-    points, velocities = motion(block, total, 1 << 14)
+    points, velocities = walk(block, total, 1 << 14)
     if curl > 0:
         assert points[-1] == pytest.approx([x, y], abs=1e-3)
     last = int(np.argmin(np.hypot(*(points - (end_x, end_y)).T)))
@@ -617,23 +618,68 @@ def test_what_is_near_is_all_there_is_and_nothing_else(kind):
         curve_near((0, -1, 0, 0, 0, 100, 10, -100, -10, 1, 0), np.array([0, 0]), 9)
 
 
+def test_steps_of_the_faster_axis():
+    """Where |Gx| = |Gy| the other axis becomes the faster one."""
+    root = math.sqrt(0.5)
+    for block, length in (
+        ((0, 0, 0, 3, -4, 0, 0, 40, 30, 0, 0), 40),
+        ((1, 0, 1, 0, 0, 100, 0, 0, 100, 0, 0), 100 * 2 * root),
+        ((1, 0, 1, 0, 0, 100, 0, 0, -100, 0, 2), 300 * 2 * root),
+        ((1, 0, 1, 0, 0, 100, 0, 0, -100, 1, 0), 100 * 2 * root),
+        ((1, 0, 1, 0, 0, 100, 0, 100, 0, 1, 4), 400 * 2 * root),
+        ((1, 0, 1, 0, 0, 100, 0, 0, -100, 1, 8), 900 * 2 * root),
+        # x² / 80² + y² / 60² = 1: a quarter is √(80² + 60²).
+        ((9, 0, 16, 0, 0, 80, 0, -80, 0, 0, 2), 200),
+        ((9, 0, 16, 0, 0, 0, 60, 0, 60, 1, 12), 1200),
+        # y² = 200x: 100 of y up to (50, 100), then 150 of x.
+        (parabola((0, 0), (0, 100), (200, 200), 8).block, 250),
+        # xy = 40,000: 200 of y to the vertex, then 200 of x.
+        ((0, 1, 0, 0, 0, 100, 400, 400, 100, 0, 0), 400),
+        ((0, -1, 0, 0, 0, 400, 100, 100, 400, 1, 0), 400),
+    ):
+        (found,) = motion(np.array([block])).steps
+        assert found == pytest.approx(length), block
+
+
+@pytest.mark.parametrize("width", [5, 12])
 @pytest.mark.parametrize("kind", KINDS)
-def test_travel_is_that_of_the_curves_points(kind):
-    """From whole turns of them, for circles and ellipses, the rest of it: what changes direction
-    within a step of the end is passed once more or less."""
-    blocks = random_blocks(kind, WIDTH, 150, np.random.default_rng(11))
-    seen = travel(blocks, WIDTH)
-    for block, way in zip(blocks, seen, strict=True):
-        moves = np.abs(np.diff(curve_points(block, 1 << 12), axis=0)).sum()
-        *_, x, y, end_x, end_y, _, turns = block.tolist()
-        rounds = turns > 4 and (x, y) == (end_x, end_y)
-        assert way == pytest.approx(moves * (2 if rounds else 1), rel=1e-4, abs=6)
+def test_motion_is_that_of_the_curves_points(kind, width):
+    """Walked in small steps. Where the curve is nearest to the end they are not quite at one."""
+    blocks = random_blocks(kind, width, 40, np.random.default_rng(11))
+    seen = motion(blocks)
+    for k, block in enumerate(blocks.tolist()):
+        points = curve_points(block, 1 << 12)
+        rounds = max(1, -(-block[10] // 4))
+        moves, middle = np.diff(points, axis=0).T, (points[:-1] + points[1:]).T / 2
+        walked = rounds * np.abs(moves).max(axis=0).sum()
+        assert seen.steps[k] == pytest.approx(walked, rel=2e-3, abs=0.15)
+        along, steep = derivatives(block, points.T), derivatives(block, middle)
+        time = rounds * (np.hypot(*moves) / np.hypot(*steep)).sum()
+        sizes, size = np.abs(along).max(axis=0), np.hypot(*along)
+        assert seen.time[k] == pytest.approx(time, rel=3e-3, abs=0.15 / size.min())
+        assert seen.first[k] == pytest.approx(sizes[0])
+        assert seen.largest[k] == pytest.approx(sizes.max(), rel=2e-2)
+        if kind in ("circle", "ellipse"):
+            # Of all of it, which some of these go round.
+            whole = curve_points((*block[:7], *block[5:7], block[9], 4), 1 << 12)
+            size = np.hypot(*derivatives(block, whole.T))
+        assert seen.smallest[k] == pytest.approx(size.min(), rel=2e-2)
 
 
-def test_travel_of_many_turns_and_without_a_way():
+def test_motion_of_many_turns_and_without_a_way():
     circle = from_coefficients([1, 0, 1, 0, 0], (0, -300), (300, 0), True, 16, full_turns=200)
-    nowhere = (1, 0, 1, 0, 0, 5, 5, 5, 5, 0, 0)
     line = from_coefficients([0, 0, 0, 99, -200], (0, 0), (200, 99), False, 16)
-    once = from_coefficients([1, 0, 1, 0, 0], (60, 80), (-60, 80), False, 16, full_turns=1)
-    seen = travel(np.array([circle.block, nowhere, line.block, once.block]), 16)
-    assert seen == pytest.approx([8 * 300 * 200.75, 0, 299, 80 + 800 + 80])
+    # x² / 80² + y² / 60² = 1, three times round: the period is 2π/√(4ac).
+    flat = (9, 0, 16, 0, 0, 0, 60, 0, 60, 1, 12)
+    seen = motion(np.array([circle.block, line.block, flat]))
+    root = math.sqrt(0.5)
+    assert seen.steps == pytest.approx([8 * 300 * root * 200.75, 200, 1200])
+    assert seen.time == pytest.approx([200.75 * math.pi, 1, 3 * 2 * math.pi / 24])
+    assert seen.first == pytest.approx([600, 200, 1920])
+    assert seen.largest == pytest.approx([600, 200, 1920])
+    assert seen.smallest == pytest.approx([600, math.hypot(200, 99), 1440])
+    # A quarter of it from the sharp end, where |Gx| = 1440, to the flat one.
+    (quarter,) = motion(np.array([(9, 0, 16, 0, 0, 80, 0, 0, 60, 0, 0)])).largest
+    assert quarter == pytest.approx(1920)
+    nowhere = (1, 0, 1, 0, 0, 5, 5, 5, 5, 0, 0)
+    assert motion(np.array([nowhere])).steps == pytest.approx(0, abs=1e-9)

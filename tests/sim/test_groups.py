@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from discreta.sim import groups
-from discreta.sim.conics import KINDS, curve_points, parabola
+from discreta.sim.conics import KINDS, motion
 from discreta.sim.groups import SAMPLE_BUDGET, SEED, WHOLE_BUDGET, survey_groups, whole_degrees
 from discreta.sim.methods import METHODS
 from tests import lecture
@@ -204,45 +204,15 @@ def test_ten_turns_of_ellipses(monkeypatch, width):
     assert {block[9] for block in blocks} == {0, 1}
 
 
-def test_steps_of_the_faster_axis_of_conics():
-    """Where |Gx| = |Gy| the other axis becomes the faster one."""
-    root = sqrt(0.5)
-    for block, length in (
-        ((0, 0, 0, 3, -4, 0, 0, 40, 30, 0, 0), 40),
-        ((1, 0, 1, 0, 0, 100, 0, 0, 100, 0, 0), 100 * 2 * root),
-        ((1, 0, 1, 0, 0, 100, 0, 0, -100, 0, 2), 300 * 2 * root),
-        ((1, 0, 1, 0, 0, 100, 0, 0, -100, 1, 0), 100 * 2 * root),
-        ((1, 0, 1, 0, 0, 100, 0, 100, 0, 1, 4), 400 * 2 * root),
-        ((1, 0, 1, 0, 0, 100, 0, 0, -100, 1, 8), 900 * 2 * root),
-        # x² / 80² + y² / 60² = 1: a quarter is √(80² + 60²).
-        ((9, 0, 16, 0, 0, 80, 0, -80, 0, 0, 2), 200),
-        ((9, 0, 16, 0, 0, 0, 60, 0, 60, 1, 12), 1200),
-        # y² = 200x: 100 of y up to (50, 100), then 150 of x.
-        (parabola((0, 0), (0, 100), (200, 200), 8).block, 250),
-        # xy = 40,000: 200 of y to the vertex, then 200 of x.
-        ((0, 1, 0, 0, 0, 100, 400, 400, 100, 0, 0), 400),
-        ((0, -1, 0, 0, 0, 400, 100, 100, 400, 1, 0), 400),
-    ):
-        (found,) = groups._steps_of_conics(np.array([block], dtype=np.int64))
-        assert found == pytest.approx(length), block
-
-
-@pytest.mark.usefixtures("few_conics")
-@pytest.mark.parametrize("width", [5, 12])
-def test_steps_of_the_faster_axis_of_conics_walked(width):
-    for group in survey_groups(CONICS, width)[:-1]:
-        for block, length in zip(group.blocks[::15], group.lengths[::15], strict=True):
-            walked = np.abs(np.diff(curve_points(block), axis=0)).max(axis=1).sum()
-            walked *= max(1, -(-block[10] // 4))
-            # They are not always at one in where the curve is nearest to the end.
-            assert length == pytest.approx(walked, rel=2e-3, abs=0.15)
-
-
 def test_conics_that_would_take_too_long_are_a_sample(monkeypatch):
     monkeypatch.setattr(groups, "_TEN_TURNS", 12)
     *kinds, turns = survey_groups(CONICS, 14)
-    # Half of 2^-2 of a step a clock.
-    clocks = [8 * group.lengths.sum() for group in (*kinds, turns)]
+    # Half of 2^-2 of a step of the steepest place a clock.
+    clocks = []
+    for group in (*kinds, turns):
+        course = motion(group.blocks)
+        np.testing.assert_array_equal(group.lengths, course.steps)
+        clocks.append(8 * np.fmax(course.steps, course.time * course.largest).sum())
     for group, taken in zip(kinds, clocks, strict=False):
         if len(group.blocks) == 20_000:
             assert taken <= WHOLE_BUDGET

@@ -134,3 +134,30 @@ def test_clocks_of_a_conic_whose_last_axis_hardly_moves():
     # A step of y takes 2^16 summations there, and twice as many if they are least in a doubling.
     assert 2**16 < method.clocks(golden, flat)[0] < 2**21
     assert method.clocks(golden, far)[0] < 2**14
+
+
+def test_clocks_of_conics_whose_scale_does_not_rise():
+    """An ellipse has that of its flat side all round, where the gradient is q/p times as large."""
+    method, p, q = METHODS["conic"], 3600, 90
+    for order, kept in (("implicit", True), ("alternated", True), ("simultaneous", False)):
+        golden = method.model(12, order=order, preload="half", guard=0)
+        # p²·y² + q²·x² by what leaves whole numbers, from the flat side and from the sharp end.
+        flat = [1, 0, 1600, 0, 0, 0, q, 0, q, 0, 40]
+        sharp = [1, 0, 1600, 0, 0, p, 0, p, 0, 1, 40]
+        clocks = method.clocks(golden, np.array([flat, sharp]))
+        # Ten turns in up to 2 summations a step, of 2π·p or, of the faster axis, 4·√(p² + q²).
+        steps = 10 * (2 * math.pi * p if kept else 4 * math.hypot(p, q))
+        assert np.all(clocks > 2 * steps)
+        assert np.all(clocks < 5 * steps)
+
+
+def test_clocks_of_conics_are_finite_whatever_a_block_is():
+    method, width = METHODS["conic"], 24
+    random = np.random.default_rng(4)
+    five = [random.integers(-(2**bits), 2**bits, 500) for bits in (*[width + 3] * 3, 52, 52)]
+    points = random.integers(-(2**width), 2**width, (4, 500))
+    blocks = np.stack([*five, *points, *random.integers(0, [[2], [2048]], (2, 500))], axis=1)
+    blocks[:10, :5] = 0
+    for choices in method.variants():
+        clocks = method.clocks(method.model(width, **choices), blocks)
+        assert np.all((clocks > 0) & (clocks < 2**55))

@@ -4,7 +4,7 @@ import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import product
-from math import hypot
+from math import hypot, pi
 
 import numpy as np
 import pytest
@@ -572,12 +572,13 @@ def test_the_command_with_conics(monkeypatch):
         *("variant", "largest error", "99.9 %", "on the conic", "at", "clocks/step"),
         *("ends missed", "completed"),
     ]
-    for row in rows:
+    # An ellipse has the scale of its steepest place all round: 2π·p instead of 4·√(p² + q²).
+    for row, slow in zip(rows, (1, pi / 2, pi / 2), strict=True):
         name, largest, usual, _, _, clocks, missed, _ = re.split(r"  +", row.strip())
         assert name == "order implicit, preload half, guard 2"
         assert 0.5 < float(usual) <= float(largest) < 2
         # 4 to 8, in the mean 4 / ln 2, and a clock for every change of direction.
-        assert 4 < float(clocks) < 8
+        assert 4 < float(clocks) < 8 * slow
         assert missed == "0"
 
 

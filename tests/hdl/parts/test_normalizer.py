@@ -61,6 +61,25 @@ def test_one_bit_of_one_axis_limits_all(width, axes):
     assert_normalizes(width, axes, sets + full)
 
 
+@pytest.mark.parametrize("signed", [False, True])
+def test_a_limit(signed):
+    """The places are those there are room for, or the limit when that is less; all zero too."""
+    part = Normalizer(6, 2, signed=signed)
+    numbers = (0, 1, 2, 3, 5, 9, 17, 31, *((-1, -2, -5, -16, -32) if signed else (32, 63)))
+
+    async def bench(ctx):
+        for x, y, limit in product(numbers, numbers, range(8)):
+            ctx.set(part.increments, {"x": x, "y": y})
+            ctx.set(part.limit, limit)
+            _, room = shifted_one_place_at_a_time((x, y), 6, signed)
+            places = min(room, limit) if x or y else limit
+            assert ctx.get(part.places) == places, (x, y, limit)
+            assert ctx.get(part.normalized.x) == x << places, (x, y, limit)
+            assert ctx.get(part.normalized.y) == y << places, (x, y, limit)
+
+    run(part, bench)
+
+
 # With a sign.
 
 
