@@ -123,6 +123,8 @@ class Circular(Part):
         A parameter is not one of the above.
     """
 
+    notation = "n = width, g = guard, M = 2^(n + g)"
+
     LECTURE: ClassVar[dict[str, Any]] = {
         "order": "simultaneous",
         "normalize": False,

@@ -160,6 +160,8 @@ class Conic(Part):
         A parameter is not one of the above.
     """
 
+    notation = "n = width, g = guard, M = 2^(2n + 6 + g)"
+
     LECTURE: ClassVar[dict[str, Any]] = {"order": "simultaneous", "preload": "zero", "guard": 0}
 
     def __init__(

@@ -8,7 +8,7 @@ Source: design of the common contract; the words follow the lecture's block diag
 УУ) and, for more than two axes, its memory cells (DX, XT, KOX, with the axis letter in place of X).
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from amaranth.hdl import Signal, signed
 from amaranth.lib import data, enum, wiring
@@ -60,10 +60,14 @@ class Part(wiring.Component):
 
     Attributes
     ----------
+    notation : str
+        What the letters of an interpolator's docstring stand for.
     intermediates : dict of str to Signal
         Signals between the registers, by names that the golden model has for them too: a proof of
         equality goes over them. Empty where it needs none.
     """
+
+    notation: ClassVar[str] = ""
 
     def __init__(self, signature: Any):
         super().__init__(signature)

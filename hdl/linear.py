@@ -92,6 +92,8 @@ class Linear(Part):
         A parameter is not one of the above.
     """
 
+    notation = "n = width, M = 2^n"
+
     def __init__(
         self, width: int = 16, axes: int = 2, *, normalize: bool = True, preload: str = "half"
     ):
