@@ -28,7 +28,7 @@ SURVEYED = [
 @pytest.mark.usefixtures("compiled_engine")
 def test_every_quarter_arc_of_8_bits():
     quarters = survey_groups(CIRCULAR, 8)[0]
-    variants = [*SURVEYED, CIRCULAR.settings["default"]]
+    variants = [*SURVEYED[::3], CIRCULAR.settings["default"]]
     rows = {say_choices(variant): SurveyRow(variant, 0) for variant in variants}
     for part in survey(CIRCULAR, 8, [quarters], variants):
         rows[say_choices(part.variant)].add(part)
@@ -38,7 +38,7 @@ def test_every_quarter_arc_of_8_bits():
         assert row.blocks == row.compared == 255
         radius = quarters.blocks[row.error_index, 0]
         assert f"| {name} | {row.largest_error:.4f} at {radius} |" in page
-    for variant in SURVEYED:
+    for variant in SURVEYED[::3]:
         low, high = TRIAL[variant["order"], variant["preload"]]
         assert low <= round(100 * rows[say_choices(variant)].largest_error) <= high
 
