@@ -6,6 +6,7 @@ derivatives and velocities are worked out from their definitions, wherever they 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +23,8 @@ Point = tuple[int, int]
 LANDS = (0, 0, 27, 4884, 3362, -232, -61, -232, -63, 1, 1)
 
 
-def derivatives(block: Sequence[int], point: Sequence[int]) -> tuple[int, int]:
-    """Give Gx = 2A·x + B·y + D and Gy = B·x + 2C·y + E."""
+def derivatives(block: Sequence[int], point: Any) -> tuple[Any, Any]:
+    """Give Gx = 2A·x + B·y + D and Gy = B·x + 2C·y + E; of many points with x and y as arrays."""
     a, b, c, d, e = block[:5]
     x, y = point
     return 2 * a * x + b * y + d, b * x + 2 * c * y + e
