@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from discreta.hdl.comparison import FIRSTS, FORMS
 from discreta.hdl.conic import MAX_WIDTH as CONIC_MAX_WIDTH
 from discreta.hdl.conic import ORDERS
 from discreta.hdl.contract import (
@@ -212,9 +213,20 @@ _setting_options = _options(
         help="Arcs and conics: bits more in the summators, 0 to 4: each halves the increments, for "
         f"less error in twice the clocks. {_defaults('guard')}",
     ),
+    click.option(
+        "--form",
+        type=click.Choice(FORMS),
+        help="Comparison: two summators that are compared with each other, or their difference "
+        f"alone, signed. {_defaults('form')}",
+    ),
+    click.option(
+        "--first",
+        type=click.Choice(FIRSTS),
+        help=f"Comparison: the axis that steps first at 45 degrees. {_defaults('first')}",
+    ),
 )
 #: What these give besides the setting.
-_CHOICES = ("preload", "normalize", "order", "guard")
+_CHOICES = ("preload", "normalize", "order", "guard", "form", "first")
 
 
 def _run_options(method: str, width: Callable = _width) -> Callable:

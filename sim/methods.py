@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from discreta.hdl.circular import Circular
+from discreta.hdl.comparison import FIRSTS, FORMS, Comparison
 from discreta.hdl.conic import MAX_WIDTH as CONIC_MAX_WIDTH
 from discreta.hdl.conic import ORDERS as CONIC_ORDERS
 from discreta.hdl.conic import Conic
@@ -17,6 +18,7 @@ from discreta.hdl.contract import MAX_WIDTH, Part
 from discreta.hdl.linear import Linear
 from discreta.sim.conics import motion
 from discreta.sim.golden.circular import Circular as GoldenCircular
+from discreta.sim.golden.comparison import Comparison as GoldenComparison
 from discreta.sim.golden.conic import Conic as GoldenConic
 from discreta.sim.golden.linear import Linear as GoldenLinear
 
@@ -111,6 +113,11 @@ def _linear_bound(golden: GoldenLinear) -> float:
     return math.sqrt(golden.axes) / 2 if golden.preload == "half" else math.sqrt(golden.axes - 1)
 
 
+def _comparison_clocks(_: GoldenComparison, blocks: np.ndarray) -> np.ndarray:
+    """One for every step of either axis, and what stands around them."""
+    return np.sum(np.abs(blocks[:, 2:] - blocks[:, :2]), axis=1) + 4
+
+
 def _circular_clocks(golden: GoldenCircular, blocks: np.ndarray) -> np.ndarray:
     """A right angle and some steps for every piece, its preparation, and what stands around it."""
     start, center = blocks[:, :2].astype(float), blocks[:, 4:6].astype(float)
@@ -202,6 +209,23 @@ METHODS = {
             },
             clocks=_linear_clocks,
             bound=_linear_bound,
+        ),
+        Method(
+            name="comparison",
+            curve="line",
+            summary="line by comparison of two sums, one axis a clock",
+            error_bound="1",
+            clocks_per_step="1 a step, up to 2 a step of the longer axis",
+            device=Comparison,
+            golden=GoldenComparison,
+            axes=(2,),
+            choices={"form": FORMS, "first": FIRSTS},
+            settings={
+                "default": {"form": "signed", "first": "x"},
+                "lecture": Comparison.LECTURE,
+            },
+            clocks=_comparison_clocks,
+            bound=lambda _: 1.0,
         ),
         Method(
             name="circular",

@@ -264,7 +264,7 @@ def _smt2(rtlil_text: str) -> str:
     """Write a design in RTLIL as SMT-LIB; in a process of its own, since Yosys talks on stdout."""
     commands = [
         "read_rtlil design.il",
-        "proc",
+        "proc -norom",  # a table stays logic: the initial values of a memory would be lost
         "flatten",
         "opt -full",
         "async2sync",

@@ -78,7 +78,13 @@ class Circular:
         kinds |= dict.fromkeys(("xk", "yk", "limit"), (n, False))
         kinds |= {"running": (1, False), "done": (1, False), "error": (2, False)}
         kinds |= dict.fromkeys(("pulse_x", "pulse_y", "direction_x", "direction_y"), (1, False))
-        kinds |= {"held": (1, False), "fault": (2, False), "empty": (1, False)}
+        return kinds | self.prepared_registers()
+
+    def prepared_registers(self) -> dict[str, tuple[int, bool]]:
+        """Give those registers of them that prepare a block, in any method that draws arcs."""
+        n = self.width
+        kinds: dict[str, tuple[int, bool]] = {"held": (1, False), "fault": (2, False)}
+        kinds |= {"empty": (1, False)}
         kinds |= dict.fromkeys(("start_x", "start_y", "center_x", "center_y"), (n + 1, True))
         kinds |= dict.fromkeys(("first_swap", "negative_x", "negative_y"), (1, False))
         kinds |= {"first_turns": (TURNS_BITS, False)}
@@ -143,8 +149,8 @@ class Circular:
         after["done"] = (taken & negate(state["running"])) | (load & state["empty"])
         after["error"] = where(start, state["fault"], 0)
 
-        meter = self._measure(state)
-        received = self._receive(inputs)
+        meter = self.measure(state)
+        received = self.receive(inputs)
         for name, value in meter.items():
             after[name] = where(accept, received.get(name, value), value)
         after["held"] = where(accept, 1, where(start, 0, state["held"]))
@@ -244,7 +250,7 @@ class Circular:
         }
         return loaded | ({"fresh": 1} if self.halves else {})
 
-    def _receive(self, inputs: dict[str, Value]) -> State:
+    def receive(self, inputs: dict[str, Value]) -> State:
         """Input processing: what a block sets when it is accepted."""
         clockwise = inputs["blocks_clockwise"]
         center = {a: inputs[f"blocks_center_{a}"] for a in "xy"}
@@ -283,7 +289,7 @@ class Circular:
             **dict.fromkeys(("mask", "start_square", "end_square", "rest", "root"), 0),
         }
 
-    def _measure(self, state: State) -> State:
+    def measure(self, state: State) -> State:
         """The radius meter and what follows from it, in the clocks after a block's acceptance."""
         n = self.width
         tick = state["tick"]

@@ -96,6 +96,7 @@ CONTOURS = {"line": LineContour, "arc": ArcContour, "conic": ConicContour}
     ("name", "blocks"),
     [
         ("linear", blocks_of_lines(100, 6)),
+        ("comparison", blocks_of_lines(100, 6)),
         ("circular", blocks_of_arcs(60, 6)),
         ("conic", blocks_of_conics(150, 6)),
     ],

@@ -89,7 +89,7 @@ class Flaw:
 
     def model(self) -> Circular:
         method, change = getattr(Circular, self.method), self.change
-        names = {"step": ("state", "inputs"), "_run": ("state", "clock"), "_receive": ("inputs",)}
+        names = {"step": ("state", "inputs"), "_run": ("state", "clock"), "receive": ("inputs",)}
 
         def broken(golden, *arguments):
             after = method(golden, *arguments)
@@ -274,51 +274,51 @@ FLAWS = [
     Flaw(
         "clockwise ignored",
         "accepted: start and end",
-        "_receive",
+        "receive",
         lambda at: {"negative_y": at.after["negative_y"] ^ at.inputs["blocks_clockwise"]},
     ),
     Flaw(
         "an end on an axis in the quadrant after it",
         "accepted: start and end",
-        "_receive",
+        "receive",
         lambda at: {"first_turns": at.after["first_turns"] + equal(at.after["to_x"], 0)},
     ),
     Flaw(
         "turned while it is prepared",
         "accepted: ... and so it stays",
-        "_measure",
+        "measure",
         lambda at: {"first_swap": at.state["first_swap"] ^ equal(at.state["tick"], 3)},
     ),
     Flaw(
         "once round forgotten",
         "crossings:",
-        "_measure",
+        "measure",
         lambda at: {"first_turns": at.state["first_turns"]},
     ),
     Flaw(
         "bit of the mask forgotten",
         "radius meter: in n clocks",
-        "_measure",
+        "measure",
         lambda at: {"mask": at.after["mask"] & 7},
     ),
     Flaw(
         "root drawn too large",
         "radius meter: in n + 2 clocks",
-        "_measure",
+        "measure",
         lambda at: {"root": at.after["root"] | equal(at.state["tick"], 7)},
     ),
     Flaw(
         "fault not raised",
         "verdict: RANGE",
-        "_measure",
+        "measure",
         lambda at: {"fault": at.after["fault"] & 0},
     ),
     Flaw(
         "fourth crossing not looked at",
         "verdict: RANGE",
-        "_measure",
+        "measure",
         lambda at: {
-            "fault": Circular(WIDTH)._measure(
+            "fault": Circular(WIDTH).measure(
                 at.state | {"first_turns": at.state["first_turns"] & 3}
             )["fault"]
         },
@@ -326,13 +326,13 @@ FLAWS = [
     Flaw(
         "root drawn too large, in every case",
         "root:",
-        "_measure",
+        "measure",
         lambda at: {"root": at.after["root"] | equal(at.state["tick"], 7)},
     ),
     Flaw(
         "once round forgotten, in every case",
         "verdict and crossings:",
-        "_measure",
+        "measure",
         lambda at: {"first_turns": at.state["first_turns"]},
     ),
 ]
