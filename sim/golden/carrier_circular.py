@@ -167,7 +167,7 @@ class CarrierCircular:
         """Give the state after reset."""
         return dict.fromkeys(self.registers(), 0)
 
-    def outputs(self, state: State) -> dict[str, Value]:
+    def outputs(self, state: State, busy_behind: Value = 0) -> dict[str, Value]:  # noqa: ARG002
         """Give what the ports show in a state."""
         return {
             "blocks_ready": negate(state["held"]),
@@ -233,6 +233,10 @@ class CarrierCircular:
             around = (self._swept(state) >> (self.width + 16)) + 1
             bad = bad | less(state["next_periods"], around * around)
         return where(equal(state["fault"], 0), where(bad, RANGE, 0), state["fault"])
+
+    def empty(self, state: State) -> Value:
+        """Tell whether the prepared block has no length."""
+        return state["empty"]
 
     def start(self, state: State, ready: Value, busy_behind: Value) -> Value:
         """Tell whether the prepared block is started."""

@@ -73,10 +73,10 @@ class CarrierLinear:
         state: State = dict.fromkeys(self.registers(), 0)
         return state | dict.fromkeys(("sx", "sy"), self.initial_fraction)
 
-    def outputs(self, state: State) -> dict[str, Value]:
+    def outputs(self, state: State, busy_behind: Value = 0) -> dict[str, Value]:
         """Give what the ports show in a state."""
         return {
-            "blocks_ready": self._ready(state),
+            "blocks_ready": self._ready(state, busy_behind),
             "steps_valid": state["waiting"],
             "steps_last": negate(state["running"]),
             "busy": state["pending"] | state["running"] | state["waiting"],
@@ -96,7 +96,7 @@ class CarrierLinear:
         """
         taken = state["waiting"] & inputs["steps_ready"]
         free = negate(state["waiting"]) | inputs["steps_ready"]
-        start = self._start(state, inputs["steps_ready"], busy_behind)
+        start = self.start(state, inputs["steps_ready"], busy_behind)
         sound = equal(self.fault(state), 0)
         load = start & sound
         empty = self.empty(state)
@@ -178,13 +178,13 @@ class CarrierLinear:
         held_up = nothing & busy_behind
         return state["pending"] & equal(state["tick"], 0) & negate(held_up)
 
-    def _start(self, state: State, ready: Value, busy_behind: Value) -> Value:
+    def start(self, state: State, ready: Value, busy_behind: Value) -> Value:
         """Tell whether the prepared block is started."""
         nothing = self.empty(state) | negate(equal(self.fault(state), 0))
         may = where(nothing, negate(state["waiting"]), negate(state["waiting"]) | ready)
         return self._prepared(state, busy_behind) & negate(state["running"]) & may
 
-    def _ready(self, state: State, busy_behind: Value = 0) -> Value:
+    def _ready(self, state: State, busy_behind: Value) -> Value:
         """Tell whether a block can be accepted: none is prepared, or it leaves for certain."""
         idle = negate(state["running"]) & negate(state["waiting"])
         return negate(state["pending"]) | (self._prepared(state, busy_behind) & idle)

@@ -4,8 +4,8 @@ From the lecture (linear interpolation, steps 1–10) and exercise 3 (section II
 the contract common to all interpolators: blocks come by a valid/ready handshake and are prepared
 one ahead; steps leave by a valid/ready handshake, one clock after the summation that carried.
 
-A state is a dict from register name to value. Numbers are as in the documents; all but SX and SY, the
-sums modulo M = 2^n, are named in :mod:`discreta.sim.golden.line_frame`.
+A state is a dict from register name to value. Numbers are as in the documents: SX and SY hold the
+sums modulo M = 2^n; :mod:`discreta.sim.golden.line_frame` names the others.
 """
 
 from dataclasses import dataclass
