@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from discreta.hdl.carrier_circular import FORMULAS
 from discreta.hdl.comparison import FIRSTS, FORMS
 from discreta.hdl.conic import MAX_WIDTH as CONIC_MAX_WIDTH
 from discreta.hdl.conic import ORDERS
@@ -33,7 +34,9 @@ from discreta.hdl.contract import (
     check_width,
 )
 from discreta.hdl.parts import PRELOADS
+from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
 from discreta.hdl.verilog import verilog as emit_verilog
+from discreta.sim.carrier import DEFAULT_PERIOD, DEFAULT_SPEED, MAX_PERIOD
 from discreta.sim.compiled import compiler
 from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
 from discreta.sim.curves import Arc, Conic, Curve, Polyline
@@ -98,6 +101,19 @@ class _Numbers(click.ParamType):
                 ctx,
             )
         return tuple(Fraction(cell) for cell in cells)
+
+
+class _Speed(_Numbers):
+    """One number more than 0."""
+
+    def __init__(self):
+        super().__init__("a speed", "0.1")
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        (speed,) = super().convert(value, param, ctx)
+        if speed <= 0:
+            self.fail(f"{value} steps per clock are no speed: choose more than 0", param, ctx)
+        return speed
 
 
 class _MethodName(click.ParamType):
@@ -224,9 +240,45 @@ _setting_options = _options(
         type=click.Choice(FIRSTS),
         help=f"Comparison: the axis that steps first at 45 degrees. {_defaults('first')}",
     ),
+    click.option(
+        "--formula",
+        type=click.Choice(FORMULAS),
+        help="Arcs on a carrier: how a point is turned by the angle of a period: by its cosine "
+        "(rotation), as the mean of where it was and would be (predictor_corrector), or along the "
+        f"tangent alone (plain). {_defaults('formula')}",
+    ),
+    click.option(
+        "--coefficient",
+        type=click.Choice(COEFFICIENTS),
+        help="Arcs on a carrier: where rotation has cosine and sine from. "
+        f"{_defaults('coefficient')}",
+    ),
 )
 #: What these give besides the setting.
-_CHOICES = ("preload", "normalize", "order", "guard", "form", "first")
+_CHOICES = (
+    *("preload", "normalize", "order", "guard", "form", "first"),
+    *("formula", "coefficient"),
+)
+
+
+def _check_period(period: int) -> None:
+    if not 1 <= period <= MAX_PERIOD:
+        raise ValueError(f"period is {period}: choose a whole number from 1 to {MAX_PERIOD}")
+
+
+_timing_options = _options(
+    click.option(
+        "--speed",
+        type=_Speed(),
+        help="On a carrier: steps of path per clock at most, a decimal or a fraction. "
+        f"[default: {float(DEFAULT_SPEED):g}]",
+    ),
+    click.option(
+        "--period",
+        type=_Number("period", 1, MAX_PERIOD, _check_period),
+        help=f"On a carrier: clocks of its period. [default: {DEFAULT_PERIOD}]",
+    ),
+)
 
 
 def _run_options(method: str, width: Callable = _width) -> Callable:
@@ -342,6 +394,7 @@ def simulate_group() -> None:
 )
 @click.option("--end", type=_Point(MAX_AXES), required=True, help="Where it ends.")
 @_run_options("linear")
+@_timing_options
 def simulate_line(start: tuple[int, ...], end: tuple[int, ...], width: int, **options: Any) -> None:
     """Run one line in two to six axes.
 
@@ -360,6 +413,7 @@ def simulate_line(start: tuple[int, ...], end: tuple[int, ...], width: int, **op
 @simulate_group.command("path")
 @click.argument("file", metavar="FILE.csv")
 @_run_options("linear")
+@_timing_options
 def simulate_path(file: str, width: int, **options: Any) -> None:
     """Run a polyline of support points without a gap.
 
@@ -396,6 +450,7 @@ def simulate_path(file: str, width: int, **options: Any) -> None:
     help=f"The turn in which it ends, up to {MAX_TURNS}, like the P of G2 and G3.",
 )
 @_run_options("circular")
+@_timing_options
 def simulate_arc(
     start: tuple[int, ...],
     end: tuple[int, ...],
@@ -523,6 +578,7 @@ def _conic_block(given: dict[str, Any], width: int) -> ConicBlock:
 
 def _simulate(curve: Curve, *, method: Method, setting: str, **options: Any) -> None:
     choices = _chosen(method, setting, {name: options.pop(name) for name in _CHOICES})
+    _check_width(method, options["width"])
     trace, vcd = options["trace"], options["vcd"]
     # Without a word the run would only seem slow.
     slow = options["engine"] is None and vcd is None and default_engine() == "pysim"
@@ -716,8 +772,9 @@ def survey_command(method: Method, width: int, setting: str | None, whole_degree
         to_refuse = f", {refused} to be refused" if refused else ""
         title = f"{method.name}, width {width}: {group.title}{to_refuse}, {compared} compared"
         headings = ["variant", "largest error", "99.9 %", f"on the {method.curve}", "at"]
-        headings += ["clocks/step", "ends missed"]
-        headings += [] if method.curve == "line" else ["completed"]
+        headings += [] if method.timed else ["clocks/step"]
+        headings += ["ends missed"]
+        headings += [] if method.curve == "line" or method.timed else ["completed"]
         headings += [] if every else ["compared"]
         table = Table(box=None, pad_edge=False)
         for heading in headings:
@@ -727,7 +784,7 @@ def survey_command(method: Method, width: int, setting: str | None, whole_degree
                 "variant": say_choices(row.variant),
                 "largest error": f"{row.largest_error:.4f}",
                 "99.9 %": f"{row.usual_error:.4f}",
-                "clocks/step": f"{row.summations / row.length:.4f}",
+                "clocks/step": f"{row.summations / max(row.length, 1):.4f}",
                 "ends missed": str(row.ends_missed),
                 "completed": str(row.completed),
                 "compared": str(row.compared),

@@ -75,6 +75,8 @@ class CarrierLinear(Part):
     ----------
     parameters : dict of str to object
         The parameters it was made with.
+    least_period : int
+        The least T, 2.
     diagram : dict of str to list of Signal
         Every register there is, grouped as in the block diagram, by the group's title.
     registers : dict of str to Signal
@@ -111,6 +113,7 @@ class CarrierLinear(Part):
         self.preload = preload
         self.parameters: dict[str, object] = {"width": width, "preload": preload}
         self.fraction_bits = width + 12
+        self.least_period = 2
         self.preloaded = 1 << (self.fraction_bits - 1) if preload == "half" else 0
 
         bits = width + self.fraction_bits

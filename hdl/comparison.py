@@ -37,14 +37,15 @@ class Comparison(Part):
     Registers: P1, P2 = ΔX, ΔY; P3, P4 = coordinates now; P5, P6 = steps left; SX, SY, or S.
 
     Latency: a block accepted in clock 0 is prepared in clock 0, started in clock 1 and summed from
-    clock 2 on; every summation is a step in the next clock. The last step leaves ΔX + ΔY + 2 clocks
-    after the block's acceptance when no step has to wait, and ``done`` follows it by one clock.
+    clock 2 on; every summation is a step in the next clock. The last step leaves ΔX + ΔY + 2
+    clocks after the block's acceptance when no step has to wait, and ``done`` follows it by one
+    clock.
 
-    Throughput: one summation a clock, which is just one step of one axis: ΔX + ΔY a block, 1 to 2 a
-    step of the longer axis. The next block is prepared while this one runs and is started in the
-    very clock in which the last step is taken: no clock is lost between that and its first
-    summation. A block of no length and a rejected block take one clock, and one more behind a block
-    that moved.
+    Throughput: one summation a clock, and every one is a step of one axis: as many clocks as
+    steps, 1 to 2 a step of the longer axis. The next block is prepared while this one runs and is
+    started in the very clock in which the last step is taken: no clock is lost between that and its
+    first summation. A block of no length and a rejected block take one clock, and one more behind a
+    block that moved.
 
     Steps: ``steps`` holds a step until it is taken and the summators wait for it. ``position``
     shows the steps taken, not the one that waits; starting a block loads it with the block's start.

@@ -36,13 +36,16 @@ class TwoStage(Part):
     last step by a clock.
 
     Throughput: one period in T clocks, within a block and from block to block, if the first stage
-    has the next block prepared by then and every step is taken at once. A block of no length and a
-    rejected block are answered when no block before them is open.
+    has the next block prepared by then and every step is taken at once; one clock more between two
+    blocks when the last step of the first falls on the last clock of its period (as with preload
+    0), since the next block loads the position. A block of no length and a rejected block are
+    answered when no block before them is open.
 
     Steps: ``steps`` holds a step until it is taken and the second stage waits for it, and with it
     the first one. ``position`` shows the steps taken, not the one that waits; with its first
     increments a block loads it with its start. Should the last increments of a block be 0 (an arc
-    that moves by less than two steps a period), ``done`` follows at once and no step was ``last``.
+    that moves by less than two steps a period) and the step before them be taken already, ``done``
+    follows at once and no step was ``last``.
 
     Reset: everything 0, nothing open, position at the origin.
 
@@ -123,12 +126,14 @@ class TwoStage(Part):
         """Describe the hardware."""
         m = Module()
         m.submodules.coarse = coarse = self.coarse
-        waiting, taken, clock, last_clock, take, stepless, answered = (
+        waiting, taken, clock, last_clock, take, nothing_more, stepless, answered = (
             Signal(name=name)
             for name in (
-                *("waiting_step", "taken", "clock", "last_clock", "take", "stepless", "answered"),
+                *("waiting_step", "taken", "clock", "last_clock", "take"),
+                *("nothing_more", "stepless", "answered"),
             )
         )
+        carry = Signal(2)
         increments = coarse.steps.payload
         free = ~waiting | self.steps.ready
         m.d.comb += [
@@ -140,9 +145,16 @@ class TwoStage(Part):
             taken.eq(waiting & self.steps.ready),
             clock.eq(self.running & free),
             last_clock.eq(self.clocks_left == 1),
-            take.eq(coarse.steps.valid & free & (~self.running | last_clock)),
+            # A new block waits until the one before it is answered, or has its last step taken.
+            take.eq(
+                coarse.steps.valid
+                & free
+                & (~self.running | last_clock)
+                & (~self.final | ~self.open | (taken & self.step_last))
+            ),
             coarse.steps.ready.eq(take),
-            stepless.eq(take & increments.last & (increments.x == 0) & (increments.y == 0)),
+            nothing_more.eq(take & increments.last & (increments.x == 0) & (increments.y == 0)),
+            stepless.eq(nothing_more & ~carry.any()),
             answered.eq((taken & self.step_last) | stepless | coarse.answered_empty),
             self.steps.valid.eq(waiting),
             self.steps.payload.last.eq(self.step_last),
@@ -181,14 +193,13 @@ class TwoStage(Part):
         none_left = Signal(2)
         for index, a in enumerate("xy"):
             total = Signal(len(self.span) + 1, name=f"total_{a}")
-            carry = Signal(name=f"carry_{a}")
             increment, left, direction = self.increment[a], self.left[a], self.direction[a]
             step, place = self.step[a], self.place[a]
             negative = increments[a] < 0
             m.d.comb += [
                 total.eq(self.sum[a] + increment),
-                carry.eq(clock & (total >= self.span)),
-                none_left[index].eq(left == carry),
+                carry[index].eq(clock & (total >= self.span)),
+                none_left[index].eq(left == carry[index]),
                 lengths[a].eq(Mux(negative, -increments[a], increments[a])),
                 self.steps.payload[a].eq(step),
                 self.position[a].eq(place),
@@ -202,11 +213,11 @@ class TwoStage(Part):
                 ]
             with m.Elif(clock):
                 m.d.sync += [
-                    self.sum[a].eq(Mux(carry, total - self.span, total)),
-                    left.eq(left - carry),
+                    self.sum[a].eq(Mux(carry[index], total - self.span, total)),
+                    left.eq(left - carry[index]),
                 ]
             with m.If(clock):
-                m.d.sync += step.eq(Cat(carry, carry & direction))
+                m.d.sync += step.eq(Cat(carry[index], carry[index] & direction))
             with m.Elif(taken):
                 m.d.sync += step.eq(0)
             with m.If(coarse.answered_empty):
@@ -216,7 +227,8 @@ class TwoStage(Part):
             with m.Elif(taken):
                 m.d.sync += place.eq(place + step)
         with m.If(clock):
-            m.d.sync += self.step_last.eq(self.final & none_left.all())
+            # The step may turn out to be the last one because nothing more comes.
+            m.d.sync += self.step_last.eq((self.final & none_left.all()) | nothing_more)
         return m
 
 

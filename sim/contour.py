@@ -213,12 +213,14 @@ class LineContour(Contour):
 
     Parameters
     ----------
-    blocks : array of int64, shape (blocks, 2 × axes)
-        Start and end of every line, in steps.
+    blocks : array of int64, shape (blocks, 2 × axes) or more columns
+        Start and end of every line, in steps; then its timing, if it has one.
+    axes : int or None
+        None: there are no other columns.
     """
 
-    def __init__(self, blocks: np.ndarray):
-        starts, ends = np.hsplit(blocks, 2)
+    def __init__(self, blocks: np.ndarray, axes: int | None = None):
+        starts, ends = np.hsplit(blocks if axes is None else blocks[:, : 2 * axes], 2)
         super().__init__(starts, ends, np.all(starts == ends, axis=1))
 
     def errors(self, points: np.ndarray, blocks: np.ndarray) -> np.ndarray:
@@ -235,8 +237,8 @@ class ArcContour(Contour):
 
     Parameters
     ----------
-    blocks : array of int64, shape (blocks, 8)
-        See :mod:`discreta.sim.arcs`.
+    blocks : array of int64, shape (blocks, 8) or more columns
+        See :mod:`discreta.sim.arcs`; then its timing, if it has one.
     """
 
     def __init__(self, blocks: np.ndarray):

@@ -49,8 +49,8 @@ class Curve(Protocol):
         """Give what compares the steps with the true curve."""
         ...
 
-    def facts(self, contour: Contour, pace: Pace, /) -> dict[str, Any]:
-        """Give what the summary says of this kind of curve alone."""
+    def facts(self, contour: Contour, pace: Pace | None, /) -> dict[str, Any]:
+        """Give what the summary says of this kind of curve alone; no pace on a carrier."""
         ...
 
     def outline(self) -> np.ndarray:
@@ -87,13 +87,13 @@ class Polyline:
         """Give what compares the steps with the true lines."""
         return LineContour(self.blocks)
 
-    def facts(self, contour: Contour, pace: Pace) -> dict[str, Any]:
+    def facts(self, contour: Contour, pace: Pace | None) -> dict[str, Any]:
         """Give segments, support points hit, path closed, clocks lost between blocks."""
         return {
             "segments": len(self.blocks),
             "support points hit": contour.ends_reached,
             "path closed": bool(np.array_equal(self.points[0], self.points[-1])),
-            "clocks lost between blocks": pace.lost,
+            **({} if pace is None else {"clocks lost between blocks": pace.lost}),
         }
 
     def outline(self) -> np.ndarray:
@@ -152,7 +152,7 @@ class Arc:
         """Give what compares the steps with the true circle."""
         return ArcContour(self.blocks)
 
-    def facts(self, _contour: Contour, _pace: Pace) -> dict[str, Any]:
+    def facts(self, _contour: Contour, _pace: Pace | None) -> dict[str, Any]:
         """Give the start's radius in steps, and the angle swept in degrees, positive if ccw."""
         return {"radius": round(self._radius, 4), "turn": round(self._turn, 4)}
 
@@ -241,7 +241,7 @@ class Conic:
         """Give what compares the steps with the block's own curve."""
         return ConicContour(self.blocks)
 
-    def facts(self, _contour: Contour, _pace: Pace) -> dict[str, Any]:
+    def facts(self, _contour: Contour, _pace: Pace | None) -> dict[str, Any]:
         """Give the kind, how far rounding moved it in steps, and an axis's changes of direction."""
         return {
             "curve": self._made.kind,

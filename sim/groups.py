@@ -7,7 +7,8 @@ from math import ceil, pi, sqrt
 import numpy as np
 
 from discreta.hdl.contract import MIN_WIDTH
-from discreta.sim.arcs import refusals, seen_from_center, swept
+from discreta.sim.arcs import RANGE, refusals, seen_from_center, swept
+from discreta.sim.carrier import angles, least_periods, lengths
 from discreta.sim.conics import KINDS, ellipse, motion, random_blocks
 from discreta.sim.methods import Method
 
@@ -26,6 +27,13 @@ _FEWEST = 64
 #: Lines of a sample, arcs of a sample, curves of every kind, and circles or ellipses that are run
 #: ten times round.
 _LINES, _ARCS, _CURVES, _TEN_TURNS = 1 << 16, 1 << 10, 20_000, 32
+
+#: On a carrier: steps per period from and to, along the longer axis of a line and along an arc, and
+#: clocks of a period more than those that every variant needs.
+_PERIOD_STEPS, _PERIOD_CLOCKS = {"line": (0.3, 20), "arc": (2, 20)}, 64
+
+#: Blocks of a group whose timing no device takes.
+_BADLY_TIMED = 64
 
 #: Radii of the arcs between whole degrees, in steps; of those all round every so manieth is run.
 _RADII, _STRIDE = range(2, 200, 3), 1999
@@ -64,11 +72,17 @@ def survey_groups(method: Method, width: int) -> list[Group]:
     about the origin of any axis ratio and angle. A group that would take more than
     :data:`WHOLE_BUDGET` summations is a sample that takes up to :data:`SAMPLE_BUDGET`.
 
+    On a carrier lines, quarter arcs, circles and arcs alike, but no ten turns, as many as take
+    :data:`SAMPLE_BUDGET` clocks, their timing drawn from the seed; and behind some of them the same
+    block with a timing that must be refused.
+
     Raises
     ------
     ValueError
         A single block of this width takes too many clocks.
     """
+    if method.timed:
+        return _timed_groups(method, width)
     if method.curve == "line":
         return _line_groups(width)
     return {"arc": _arc_groups, "conic": _conic_groups}[method.curve](method, width)
@@ -141,6 +155,73 @@ def _arc_groups(method: Method, width: int) -> list[Group]:
             (f"a sample (seed {SEED}) of {len(arcs)} arcs", arcs),
         )
     ]
+
+
+def _timed_groups(method: Method, width: int) -> list[Group]:
+    models = [method.model(width, 2, **variant) for variant in method.variants()]
+    least = max(model.least_period for model in models)
+    fewest = _PERIOD_STEPS[method.curve][0]
+    name, far = ("line", 1) if method.curve == "line" else ("quarter arc", pi / 2)
+
+    def most_clocks(width: int) -> int:
+        return ceil(far * 2**width / fewest) * (least + _PERIOD_CLOCKS)
+
+    _room(width, name, most_clocks)
+    if method.curve == "line":
+        (group,) = _line_groups(width)
+        chosen = [("lines", 4**width, group.blocks)]
+    else:
+        radii = np.arange(1, 1 << width)
+        arcs = _random_arcs(width, _ARCS)
+        chosen = [
+            ("quarter arcs", len(radii), _about_origin(radii, quarter=True)),
+            # A circle's axes may rise to R + 1.
+            ("circles", len(radii) - 1, _about_origin(radii[:-1])),
+            ("arcs", 0, arcs),
+        ]
+    random = np.random.default_rng(SEED)
+    return [_timed_group(*group, method.curve, least, random) for group in chosen]
+
+
+def _timed_group(
+    what: str,
+    there_are: int,
+    blocks: np.ndarray,
+    kind: str,
+    least: int,
+    random: np.random.Generator,
+) -> Group:
+    """Time as many of the blocks, of so many that there are, as there is room for."""
+    if kind == "line":
+        far = np.abs(blocks[:, 2:] - blocks[:, :2]).max(axis=1).astype(float)
+        enough = np.ones(len(blocks), dtype=np.int64)
+    else:
+        far, enough = lengths("arc", blocks), least_periods(blocks, "plain")
+    steps = np.exp(random.uniform(*np.log(_PERIOD_STEPS[kind]), len(blocks)))
+    periods = np.maximum(np.ceil(far / steps).astype(np.int64), enough)
+    period = random.integers(least, least + _PERIOD_CLOCKS, len(blocks), endpoint=True)
+    blocks = np.column_stack([blocks, periods, period])
+    order = random.permutation(len(blocks))
+    room = np.searchsorted(np.cumsum((periods * period)[order]), SAMPLE_BUDGET, side="right")
+    chosen = np.sort(order[:room])
+    blocks, far = blocks[chosen], far[chosen]
+
+    title = _how_many(len(blocks), there_are, what)
+    behind = np.sort(random.integers(0, len(blocks), _BADLY_TIMED))
+    bad = blocks[behind]
+    # No periods; a period too short; and an angle too large, or again too short.
+    bad[0::3, -2], bad[1::3, -1] = 0, 1
+    if kind == "line":
+        bad[2::3, -1] = 0
+    else:
+        bad[2::3, -2] = angles(bad[2::3]) > 1
+        far = _faster_steps(blocks)
+    return Group(
+        f"{title}, and {len(bad)} of bad timing",
+        np.insert(blocks, behind + 1, bad, axis=0),
+        np.insert(np.zeros(len(blocks), dtype=np.int64), behind + 1, RANGE),
+        np.insert(far, behind + 1, 0.0),
+    )
 
 
 def _pick(candidates: np.ndarray, room: int) -> np.ndarray:
@@ -268,6 +349,8 @@ def whole_degrees(method: Method, width: int) -> list[Group]:
     ValueError
         The method draws no arcs, the width has no room for the circles, or takes too many clocks.
     """
+    if method.timed:
+        raise ValueError(f"{method.name} has no arcs between whole degrees: survey circular")
     if method.curve != "arc":
         raise ValueError(f"there are no {method.curve}s between whole degrees: survey circular")
     far = _RADII[-1] + 1

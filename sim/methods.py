@@ -9,6 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from discreta.hdl.carrier_circular import FORMULAS, CarrierCircular
+from discreta.hdl.carrier_circular import MAX_WIDTH as CARRIER_CIRCULAR_MAX_WIDTH
+from discreta.hdl.carrier_linear import MAX_WIDTH as CARRIER_LINEAR_MAX_WIDTH
+from discreta.hdl.carrier_linear import CarrierLinear
 from discreta.hdl.circular import Circular
 from discreta.hdl.comparison import FIRSTS, FORMS, Comparison
 from discreta.hdl.conic import MAX_WIDTH as CONIC_MAX_WIDTH
@@ -16,7 +20,10 @@ from discreta.hdl.conic import ORDERS as CONIC_ORDERS
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import MAX_WIDTH, Part
 from discreta.hdl.linear import Linear
+from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
 from discreta.sim.conics import motion
+from discreta.sim.golden.carrier_circular import CarrierCircular as GoldenCarrierCircular
+from discreta.sim.golden.carrier_linear import CarrierLinear as GoldenCarrierLinear
 from discreta.sim.golden.circular import Circular as GoldenCircular
 from discreta.sim.golden.comparison import Comparison as GoldenComparison
 from discreta.sim.golden.conic import Conic as GoldenConic
@@ -56,6 +63,14 @@ class Method:
         ``bound(golden)``: the proven error bound of one model, in steps; None without one.
     max_width : int
         Its devices have 4 to so many bits.
+    timed : bool
+        It runs on a constant carrier: its blocks end with the fields ``periods`` and ``period``,
+        and its golden models know their ``least_period``.
+    per_period : bool
+        What it puts out are the steps of a whole period, any number an axis.
+    differs : callable
+        ``differs(choices)``: whether this combination of choices makes a machine that no other one
+        makes, to be surveyed and proven.
     """
 
     name: str
@@ -71,6 +86,9 @@ class Method:
     clocks: Callable[[Any, np.ndarray], np.ndarray]
     bound: Callable[[Any], float | None]
     max_width: int = MAX_WIDTH
+    timed: bool = False
+    per_period: bool = False
+    differs: Callable[[dict[str, Any]], bool] = lambda _: True
 
     def core(self, width: int, axes: int = 2, **choices: Any) -> Part:
         """Make the RTL; ``TypeError`` or ``ValueError`` for what its constructor refuses."""
@@ -90,11 +108,12 @@ class Method:
         return import_module(f"discreta.sim.proofs.{self.name}").promises(golden)
 
     def variants(self) -> list[dict[str, Any]]:
-        """Give every combination of the choices."""
-        return [
+        """Give every combination of the choices that makes another machine."""
+        combinations = [
             dict(zip(self.choices, values, strict=True))
             for values in product(*self.choices.values())
         ]
+        return [choices for choices in combinations if self.differs(choices)]
 
 
 def _linear_clocks(golden: GoldenLinear, blocks: np.ndarray) -> np.ndarray:
@@ -167,6 +186,33 @@ def _conic_clocks(golden: GoldenConic, blocks: np.ndarray) -> np.ndarray:
     steps = np.where(steps >= 0, np.fmin(steps, most), none)
     clocks = (steps + beside + _alone(blocks)) * 2.0 ** (golden.guard + 1)
     return clocks.astype(np.int64) + pieces + golden.width + 10
+
+
+#: Clocks that stand around a block on a carrier, beside its preparation and its periods.
+_AROUND = 8
+
+
+def _carrier_linear_clocks(golden: GoldenCarrierLinear, blocks: np.ndarray) -> np.ndarray:
+    """N·T, the preparation, and what stands around them; a refused block may have any N and T."""
+    return blocks[:, -2] * blocks[:, -1] + 2 * golden.width + 14 + _AROUND
+
+
+def _carrier_linear_bound(golden: GoldenCarrierLinear) -> float:
+    """On both axes 9/16 of a step to either side, or 17/16 behind: along the line and across it."""
+    return math.sqrt(2) * 9 / 16 if golden.preload == "half" else 17 / 16
+
+
+def _carrier_circular_clocks(golden: GoldenCarrierCircular, blocks: np.ndarray) -> np.ndarray:
+    """N·T, the preparation, the products of the first period, and what stands around them."""
+    preparation = 2 * golden.width + 6 + golden.prepared
+    if golden.formula == "rotation":
+        preparation += len(golden.program) * (golden.bits + 2)
+    return blocks[:, -2] * blocks[:, -1] + preparation + golden.least_period + _AROUND
+
+
+def _uses_its_coefficient(choices: dict[str, Any]) -> bool:
+    """Leave out the coefficient's other sources where no coefficient is used."""
+    return choices["formula"] == "rotation" or choices["coefficient"] == COEFFICIENTS[0]
 
 
 def _alone(blocks: np.ndarray) -> np.ndarray:
@@ -276,6 +322,52 @@ METHODS = {
             clocks=_conic_clocks,
             bound=lambda _: None,
             max_width=CONIC_MAX_WIDTH,
+        ),
+        Method(
+            name="carrier_linear",
+            curve="line",
+            summary="line on a constant carrier: all the steps of a period at once",
+            error_bound="17/16 (preload zero), 0.80 (half)",
+            clocks_per_step="as timed: a period of T clocks for up to F·T steps",
+            device=CarrierLinear,
+            golden=GoldenCarrierLinear,
+            axes=(2,),
+            choices={"preload": ("half", "zero")},
+            settings={"default": {"preload": "half"}, "lecture": CarrierLinear.LECTURE},
+            clocks=_carrier_linear_clocks,
+            bound=_carrier_linear_bound,
+            max_width=CARRIER_LINEAR_MAX_WIDTH,
+            timed=True,
+            per_period=True,
+        ),
+        Method(
+            name="carrier_circular",
+            curve="arc",
+            summary="arc on a constant carrier: all the steps of a period at once",
+            error_bound="-",
+            clocks_per_step="as timed: a period of T clocks for up to F·T steps",
+            device=CarrierCircular,
+            golden=GoldenCarrierCircular,
+            axes=(2,),
+            choices={
+                "formula": FORMULAS,
+                "coefficient": COEFFICIENTS,
+                "preload": ("half", "zero"),
+            },
+            settings={
+                "default": {
+                    "formula": "rotation",
+                    "coefficient": "series",
+                    "preload": "half",
+                },
+                "lecture": CarrierCircular.LECTURE,
+            },
+            clocks=_carrier_circular_clocks,
+            bound=lambda _: None,
+            max_width=CARRIER_CIRCULAR_MAX_WIDTH,
+            timed=True,
+            per_period=True,
+            differs=_uses_its_coefficient,
         ),
     )
 }

@@ -22,6 +22,9 @@ _COLUMNS = 1 << 11
 #: it: half a turn of the largest circle whose other side the window can show.
 _SIDE, _NEAR = 7, 28
 
+#: Periods up to which each has a dot.
+_DOTS = 400
+
 #: Letters of a title in the common size; of longer ones they are smaller.
 _TITLE = 56
 
@@ -49,10 +52,13 @@ class PathPlot:
     ----------
     curve : Curve
         The true path.
+    periods : bool
+        A point is where a whole period led: what it moved along both axes is drawn as well.
     """
 
-    def __init__(self, curve: Curve):
+    def __init__(self, curve: Curve, *, periods: bool = False):
         self._curve = curve
+        self._periods = periods
         self._seen = 1
         self._recent = curve.start[None, :2]
         # Every stride-th point.
@@ -61,6 +67,8 @@ class PathPlot:
         # The largest of every span of errors.
         self._errors = np.zeros(_COLUMNS)
         self._span = 1
+        # What every span has moved, x and y.
+        self._moves = np.zeros((2, _COLUMNS), dtype=np.int64)
         self._worst = -1.0
         self._window = np.empty((0, 2), dtype=np.int64)
         self._center: np.ndarray | None = None
@@ -71,6 +79,7 @@ class PathPlot:
         if not len(points):
             return
         points = points[:, :2]
+        moves = np.diff(points, axis=0, prepend=self._recent[-1:])
         self._follow_worst(points, errors)
         index = np.arange(self._seen, self._seen + len(points))
         self._seen += len(points)
@@ -86,8 +95,12 @@ class PathPlot:
         while self._seen > _COLUMNS * self._span:
             halves = self._errors.reshape(-1, 2).max(axis=1)
             self._errors = np.concatenate([halves, np.zeros_like(halves)])
+            sums = self._moves.reshape(2, -1, 2).sum(axis=2)
+            self._moves = np.concatenate([sums, np.zeros_like(sums)], axis=1)
             self._span *= 2
         np.maximum.at(self._errors, index // self._span, errors)
+        for total, moved in zip(self._moves, moves.T, strict=True):
+            np.add.at(total, index // self._span, moved)
 
     def _follow_worst(self, points: np.ndarray, errors: np.ndarray) -> None:
         """Keep the points around the largest error, also when they come in two parts."""
@@ -115,17 +128,22 @@ class PathPlot:
         own = {"svg.hashsalt": "discreta", "svg.fonttype": "none", "font.size": 9}
         with style.context(["default", own]):
             figure = Figure(figsize=(9, 6.5), dpi=110, layout="constrained")
-            whole, near, along = figure.subplot_mosaic(
-                [["path", "near"], ["error", "error"]],
-                height_ratios=[3, 1],
+            rows = ["moves", "error"] if self._periods else ["error"]
+            panels = figure.subplot_mosaic(
+                [["path", "near"], *([row, row] for row in rows)],
+                height_ratios=[3, *(1 for _ in rows)],
                 width_ratios=[1.7, 1],
-            ).values()
+            )
+            whole, near, along = (panels[name] for name in ("path", "near", "error"))
             if self._curve.axes > 2:
                 title += f"; x and y of {AXIS_LETTERS[: self._curve.axes]}"
             self._draw_path(whole, title)
             self._draw_window(near)
+            handles = whole.get_lines()
+            if self._periods:
+                handles += self._draw_moves(panels["moves"])
             self._draw_errors(along)
-            figure.legend(handles=whole.get_lines(), loc="outside lower center", ncols=4)
+            figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
             metadata = {"Date": None} if kind == ".svg" else {"Software": None}
             figure.savefig(path, format=kind[1:], metadata=metadata)
 
@@ -135,7 +153,11 @@ class PathPlot:
             points = np.concatenate([points, self._recent[-1:]])
         true = self._curve.outline()[:, :2]
         axes.plot(*true.T, color="#2c7fb8", lw=1.6, label="true path", gid="true")
-        axes.plot(*points.T, color="#222222", lw=0.7, label="steps taken", gid="steps")
+        if self._periods:
+            style, label = "o-" if len(points) <= _DOTS else "-", "periods"
+        else:
+            style, label = "-", "steps taken"
+        axes.plot(*points.T, style, color="#222222", lw=0.7, ms=2, label=label, gid="steps")
         axes.plot(*self._curve.start[:2], "o", color="#2ca02c", ms=8, label="start")
         axes.plot(*points[-1], "s", color="#c0392b", ms=4, label="end")
         axes.set_aspect("equal", adjustable="datalim")
@@ -166,13 +188,36 @@ class PathPlot:
         axes.ticklabel_format(useOffset=False, style="plain")
         axes.grid(alpha=0.3)
 
+    def _draw_moves(self, axes) -> list:
+        last = self._seen - 1
+        # Point number 0 is the start; the period before number 1 is the first.
+        edges = np.clip(np.arange(-(-self._seen // self._span) + 1) * self._span - 1, 0, last)
+        periods = np.diff(edges)
+        edges, some = np.unique(edges), periods > 0
+        each = f", the mean of every {self._span}" if self._span > 1 else ""
+        drawn = []
+        for name, total, color in zip("xy", self._moves, ("#7b3294", "#e08214"), strict=True):
+            mean = total[: len(periods)][some] / periods[some]
+            if len(mean):
+                label, gid = f"steps along {name}", f"moves-{name}"
+                line = {"color": color, "lw": 1.2, "label": label, "gid": gid}
+                drawn.append(axes.stairs(mean, edges, baseline=None, **line))
+        axes.axhline(0, color="#888888", lw=0.5)
+        axes.set(title=f"steps per period{each}", xlabel="periods", ylabel="steps")
+        axes.locator_params(axis="x", integer=True)
+        axes.use_sticky_edges = False
+        axes.margins(x=0, y=0.1)
+        axes.grid(alpha=0.3)
+        return drawn
+
     def _draw_errors(self, axes) -> None:
         errors = self._errors[: -(-self._seen // self._span)]
-        each = f", the largest of every {self._span} steps" if self._span > 1 else ""
+        what = "periods" if self._periods else "steps"
+        each = f", the largest of every {self._span} {what}" if self._span > 1 else ""
         axes.plot(np.arange(len(errors)) * self._span, errors, color="#c0392b", lw=0.7, gid="error")
         axes.set(
             title=f"distance from the true path{each}",
-            xlabel="steps taken",
+            xlabel="periods" if self._periods else "steps taken",
             ylabel="steps",
             ylim=(0, None),
         )

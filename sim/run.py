@@ -3,12 +3,22 @@
 import csv
 import json
 from collections.abc import Callable, Iterable
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from discreta.hdl.contract import AXIS_LETTERS
+from discreta.sim.carrier import (
+    DEFAULT_PERIOD,
+    DEFAULT_SPEED,
+    add_timing,
+    check_timing,
+    lengths,
+    mean_angle,
+    mean_increments,
+)
 from discreta.sim.curves import Curve
 from discreta.sim.methods import METHODS, Method
 from discreta.sim.outputs import Outputs
@@ -35,6 +45,8 @@ def run(
     plot: str | None = None,
     summary_file: str | None = None,
     reads: Iterable[str] = (),
+    speed: Fraction | None = None,
+    period: int | None = None,
     progress: Callable[[int, int], object] | None = None,
     **choices: Any,
 ) -> dict[str, Any]:
@@ -57,6 +69,10 @@ def run(
         Files for the waveform, with a ``.gtkw`` view beside it, and for the picture.
     reads : iterable of str
         Files that must not be written over.
+    speed : Fraction or None
+        Of a method on a carrier: F > 0, in steps of path per clock; None: 1/10.
+    period : int or None
+        Of such a method: T, in clocks; None: 200.
     progress : callable or None
         Called with the clocks run and the most there can be; the first time when every file has its
         place.
@@ -78,6 +94,16 @@ def run(
             f"method {method.name} draws {method.curve}s and no {curve.kind}s: choose "
             f"{' or '.join(fitting)}"
         )
+    if curve.axes not in method.axes:
+        raise BadInputError(
+            f"the {curve.kind} has {curve.axes} axes and method {method.name} {method.axes[0]}: "
+            "choose linear"
+        )
+    given = {"speed": speed, "period": period}
+    for name in () if method.timed else [name for name in given if given[name] is not None]:
+        raise BadInputError(
+            f"--{name} is no option of {method.name}, which has no carrier: leave it out"
+        )
     curve.check(width)
     if vcd is not None and (vcd == "-" or Path(vcd).is_char_device() or Path(vcd).is_fifo()):
         raise BadInputError("--vcd needs a file: its .gtkw view goes beside it")
@@ -91,10 +117,12 @@ def run(
         raise BadInputError("--engine compiled needs a C++ compiler: install one or use pysim")
     kind = picture_format(plot) if plot is not None else ""
 
-    blocks = curve.blocks
     golden = method.model(width, curve.axes, **choices)
+    blocks = _timed(curve, golden, width, speed, period) if method.timed else curve.blocks
     limit = int(method.clocks(golden, blocks).sum()) + _OVERHEAD
-    contour, pace, picture = curve.contour(), Pace(), PathPlot(curve)
+    contour, pace = curve.contour(), None if method.timed else Pace()
+    picture = PathPlot(curve, periods=method.per_period)
+    steps, here = 0, curve.start[None]
     with Outputs(reads) as outputs:
         trace_file = outputs.open(trace) if trace is not None else None
         json_file = outputs.open(summary_file) if summary_file is not None else None
@@ -111,11 +139,20 @@ def run(
             rows.writerow([0, *curve.start.tolist()])
         clocks = 0
         stretches = simulate(
-            core, blocks, limit=limit, engine=engine, watch=("reg_running",), vcd=vcd_file
+            core,
+            blocks,
+            limit=limit,
+            engine=engine,
+            watch=("reg_running",) if pace else (),
+            vcd=vcd_file,
         )
         for stretch in stretches:
             when, reached, errors = contour.follow(stretch)
-            pace.follow(stretch)
+            if pace:
+                pace.follow(stretch)
+            if len(reached):
+                moves = np.diff(reached, axis=0, prepend=here)
+                steps, here = steps + int(np.abs(moves).max(axis=1).sum()), reached[-1:]
             if rows:
                 rows.writerows(np.column_stack([when, reached]).tolist())
             if plot_part:
@@ -129,9 +166,10 @@ def run(
             **core.parameters,
             "engine": engine,
             "clocks": contour.clocks,
-            "summations": pace.summations,
-            "steps": contour.steps,
-            "clocks per step": round(contour.clocks / contour.steps, 4) if contour.steps else None,
+            **({} if pace is None else {"summations": pace.summations}),
+            "steps": steps,
+            "clocks per step": round(contour.clocks / steps, 4) if steps else None,
+            **(_timing_facts(curve, blocks, width) if method.timed else {}),
             "largest error": round(contour.largest_error, 4),
             "largest error at": list(contour.error_at),
             **({} if bound is None else {"error bound": round(bound, 4)}),
@@ -148,6 +186,41 @@ def run(
             json.dump(summary, json_file, indent=2)
             json_file.write("\n")
     return summary
+
+
+def _timed(
+    curve: Curve, golden: Any, width: int, speed: Fraction | None, period: int | None
+) -> np.ndarray:
+    """Give the blocks of a curve with their timing, if a device takes them."""
+    blocks = add_timing(
+        curve.kind,
+        curve.blocks,
+        DEFAULT_SPEED if speed is None else speed,
+        DEFAULT_PERIOD if period is None else period,
+    )
+    return check_timing(
+        curve.kind,
+        blocks,
+        width,
+        least_period=golden.least_period,
+        formula=getattr(golden, "formula", "rotation"),
+    )
+
+
+def _timing_facts(curve: Curve, blocks: np.ndarray, width: int) -> dict[str, Any]:
+    """Give periods and mean steps of path in one; of one block the mean increments or angle."""
+    periods = blocks[:, -2].tolist()
+    facts = {
+        "period": int(blocks[0, -1]),
+        "periods": sum(periods),
+        "steps per period": round(float(lengths(curve.kind, curve.blocks).sum() / sum(periods)), 4),
+    }
+    if len(blocks) > 1:
+        return facts
+    if curve.kind == "line":
+        means = mean_increments(curve.blocks[0], periods[0], width)
+        return facts | {"mean increments": [round(float(mean), 4) for mean in means]}
+    return facts | {"mean angle": round(float(mean_angle(curve.blocks[0], *periods, width)), 6)}
 
 
 def say_choices(choices: dict[str, Any]) -> str:

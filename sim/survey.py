@@ -63,7 +63,7 @@ class SurveyRow:
     completed : int
         Arcs and conics that took completing steps.
     summations : int
-        Clocks in which the device ran.
+        Clocks in which the device ran; not counted on a carrier.
     length : float
         Steps of the axis that moves faster, of all blocks.
     findings : list of str
@@ -119,11 +119,15 @@ class _Curve(Protocol):
     fields : tuple of str
         The fields of a block.
     watch : tuple of str
-        ``running``, and what registers :meth:`completing` needs.
+        ``running``, and what registers :meth:`completing` needs; none of a method on a carrier,
+        whose clocks are those of its timing.
+    cost : int
+        How many times as long as another a golden model takes for a clock.
     """
 
     fields: tuple[str, ...]
     watch: tuple[str, ...]
+    cost: int
 
     def contour(self, blocks: np.ndarray) -> Contour:
         """Give what compares the steps with the true curves."""
@@ -147,6 +151,7 @@ class _Lines:
 
     fields: tuple[str, ...] = ("start_x", "start_y", "end_x", "end_y")
     watch: tuple[str, ...] = ("running",)
+    cost: int = 1
 
     def contour(self, blocks: np.ndarray) -> LineContour:
         """Compare with the lines."""
@@ -170,6 +175,7 @@ class _Arcs:
 
     fields: tuple[str, ...] = (*_Lines.fields, "center_x", "center_y", "clockwise", "full_turns")
     watch: tuple[str, ...] = ("running", "turns", "backward", "p1", "p2", "p3", "p4")
+    cost: int = 1
 
     def contour(self, blocks: np.ndarray) -> ArcContour:
         """Compare with the circles."""
@@ -197,6 +203,39 @@ class _Arcs:
         return arc, say_point(point)
 
 
+class _TimedLines(_Lines):
+    """Lines in the plane on a carrier."""
+
+    fields: tuple[str, ...] = (*_Lines.fields, "periods", "period")
+    watch: tuple[str, ...] = ()
+
+    def contour(self, blocks: np.ndarray) -> LineContour:
+        """Compare with the lines."""
+        return LineContour(blocks, 2)
+
+    def say(self, block: np.ndarray, point: np.ndarray) -> tuple[str, str]:
+        """Write the lengths with their signs and the periods, and the point from the start."""
+        line, point_said = super().say(block[:4], point)
+        return f"{line} in {block[-2]} periods", point_said
+
+
+class _TimedArcs(_Arcs):
+    """Arcs of circles on a carrier."""
+
+    fields: tuple[str, ...] = (*_Arcs.fields, "periods", "period")
+    watch: tuple[str, ...] = ()
+    cost: int = 8
+
+    def clocks(self, method: Method, golden: Any, group: Group) -> np.ndarray:
+        """Give the most clocks that they can take, and few take fewer."""
+        return method.clocks(golden, group.blocks)
+
+    def say(self, block: np.ndarray, point: np.ndarray) -> tuple[str, str]:
+        """Write the arc with what is not usual of it and the periods, and the point."""
+        arc, point_said = super().say(block, point)
+        return f"{arc} in {block[-2]} periods", point_said
+
+
 class _Conics:
     """Curves of the second order."""
 
@@ -205,6 +244,7 @@ class _Conics:
         *("running", "turns", "gx", "gy", "p3", "p4", "clockwise"),
         *("backward_x", "backward_y", "direction_x", "direction_y"),
     )
+    cost: int = 1
 
     def contour(self, blocks: np.ndarray) -> ConicContour:
         """Compare with the curves."""
@@ -245,17 +285,28 @@ class _Conics:
         return f"{curve}{' cw' if block[9] else ''}{turns}", say_point(point)
 
 
-_CURVES: dict[str, _Curve] = {"line": _Lines(), "arc": _Arcs(), "conic": _Conics()}
+_CURVES: dict[tuple[str, bool], _Curve] = {
+    ("line", False): _Lines(),
+    ("arc", False): _Arcs(),
+    ("conic", False): _Conics(),
+    ("line", True): _TimedLines(),
+    ("arc", True): _TimedArcs(),
+}
+
+
+def _curve(method: Method) -> _Curve:
+    return _CURVES[method.curve, method.timed]
 
 
 def say_worst(method: Method, group: Group, row: SurveyRow) -> tuple[str, str]:
     """Write the block with the largest error, and the point, as a table has them.
 
     A line is written as its lengths with their signs, and the point as seen from its start; an arc
-    as start and end, with ``about`` its center if that is not the origin, and ``cw``; a conic as
-    its coefficients, start and end, ``cw`` and in how many turns it ends if that is not one.
+    as start and end, with ``about`` its center if that is not the origin, and ``cw``; both with
+    their periods, if they have any; a conic as its coefficients, start and end, ``cw`` and in how
+    many turns it ends if that is not one.
     """
-    return _CURVES[method.curve].say(group.blocks[row.error_index], np.array(row.error_at))
+    return _curve(method).say(group.blocks[row.error_index], np.array(row.error_at))
 
 
 def survey(
@@ -278,13 +329,12 @@ def survey(
     RuntimeError
         There is no C++ compiler.
     """
+    budget = REGISTER_BUDGET // _curve(method).cost // len(variants) // len(groups)
     parts = [
         part
         for variant in variants
         for number, group in enumerate(groups)
-        for part in _parts(
-            method, width, variant, number, group, REGISTER_BUDGET // len(variants) // len(groups)
-        )
+        for part in _parts(method, width, variant, number, group, budget)
     ]
     with ProcessPoolExecutor(os.cpu_count(), initializer=_begin, initargs=(groups,)) as pool:
         try:
@@ -314,7 +364,7 @@ def _parts(
 ) -> Iterator[_Part]:
     """Split a group: into what is compared within a budget of clocks and what is not, and these."""
     golden = method.model(width, 2, **variant)
-    clocks = _CURVES[method.curve].clocks(method, golden, group)
+    clocks = _curve(method).clocks(method, golden, group)
     mixed = np.random.default_rng(SEED).permutation(len(clocks))
     count = np.searchsorted(np.cumsum(clocks[mixed]), budget, side="right")
     for compared, chosen in ((True, mixed[:count]), (False, mixed[count:])):
@@ -378,7 +428,7 @@ class _Judge:
     """
 
     def __init__(self, method: Method, blocks: np.ndarray, golden: Any | None):
-        self._curve, self._name = _CURVES[method.curve], method.curve
+        self._curve, self._name = _curve(method), method.curve
         self._blocks, self._golden = blocks, golden
         self.names = tuple(golden.registers()) if golden else self._curve.watch
         self.contour = self._curve.contour(blocks)
@@ -413,6 +463,8 @@ class _Judge:
 
     def _watch(self, first: int, seen: dict[str, np.ndarray]) -> None:
         """Take in what was watched in the clocks from ``first`` on."""
+        if not self._curve.watch:
+            return
         self.summations += int(seen["running"].sum())
         completing = first + np.flatnonzero(self._curve.completing(seen))
         # A block is answered before the next one runs for the first time.

@@ -14,10 +14,12 @@ from amaranth import Cat, Module, Mux, Signal
 from amaranth.hdl import Value
 
 from discreta.hdl.circular import Circular
+from discreta.hdl.comparison import Comparison
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import ErrorCode, Part
 from discreta.hdl.linear import Linear
 from discreta.sim.golden.circular import Circular as GoldenCircular
+from discreta.sim.golden.comparison import Comparison as GoldenComparison
 from discreta.sim.golden.conic import Conic as GoldenConic
 from discreta.sim.golden.linear import Linear as GoldenLinear
 from discreta.sim.golden.logic import equal, where
@@ -81,6 +83,13 @@ SOUND = [
         "nothing: as in the documents, not normalized, preload zero",
         options=METHODS["linear"].settings["lecture"],
     ),
+    Variant(METHODS["comparison"], "sound comparison", "nothing: one signed summator"),
+    Variant(
+        METHODS["comparison"],
+        "sound comparison, lecture",
+        "nothing: two summators, as in the article's table",
+        options=METHODS["comparison"].settings["lecture"],
+    ),
     Variant(METHODS["circular"], "sound arc", "nothing: the default setting"),
     Variant(
         METHODS["circular"],
@@ -117,6 +126,7 @@ def _variant(
 
 _line, _arc = partial(_variant, "linear"), partial(_variant, "circular")
 _conic = partial(_variant, "conic")
+_comparison = partial(_variant, "comparison")
 
 
 def _amend(part: Part, change: Callable[[Module], None]) -> None:
@@ -644,3 +654,160 @@ def side_misread(core: Conic) -> None:
             m.d.sync += core.clockwise.eq(~core.blocks.payload.clockwise)
 
     _amend(core, change)
+
+
+# Comparison lines. A broken rule, sum, counter or end: whoever looks at all lines sees it.
+
+
+def _sum_up(core: Comparison, by_x: Value, by_y: Value) -> None:
+    """Have S change by these, by a step of x and by one of y, in place of its own change."""
+    s = core.sums["s"]
+
+    def change(m: Module) -> None:
+        with m.If(core.uu.clock):
+            m.d.sync += s.eq(Mux(core.turn, s + by_x, s + by_y))
+
+    _amend(core, change)
+
+
+def _lengths(core: Comparison) -> tuple[Signal, Signal]:
+    return core.increment["x"].register, core.increment["y"].register
+
+
+@_comparison({*ALL})
+def lengths_exchanged(core: Comparison) -> None:
+    """A step of x adds ΔX, and one of y takes ΔY off."""
+    dx, dy = _lengths(core)
+    _sum_up(core, dx, -dy)
+
+
+@_comparison({*ALL})
+def equal_sums_step_y(core: Comparison) -> None:
+    """Of equal sums y steps, whichever axis is longer."""
+    _assign(core, core.turn, core.sums["s"] < 0)
+
+
+@_comparison({*ALL})
+def shorter_axis_first(core: Comparison) -> None:
+    """Of equal sums the shorter axis steps."""
+    s, (dx, dy) = core.sums["s"], _lengths(core)
+    _assign(core, core.turn, (s < 0) | ((s == 0) & (dx < dy)))
+
+
+# No line of the benches that draw theirs is at 45°.
+@_comparison({DOCUMENTS, EQUIVALENCE, PROMISES, COMPILED})
+def other_side_at_45_degrees(core: Comparison) -> None:
+    """Of equally long axes y goes first, though it is x that was asked for."""
+    s, (dx, dy) = core.sums["s"], _lengths(core)
+    _assign(core, core.turn, (s < 0) | ((s == 0) & (dx > dy)))
+
+
+@_comparison({*ALL})
+def difference_a_bit_short(core: Comparison) -> None:
+    """S is worked out in n bits, sign and all."""
+    s, (dx, dy) = core.sums["s"], _lengths(core)
+
+    def change(m: Module) -> None:
+        with m.If(core.uu.clock):
+            m.d.sync += s.eq(Mux(core.turn, s + dy, s - dx)[: core.width].as_signed())
+
+    _amend(core, change)
+
+
+@_comparison({*ALL}, **METHODS["comparison"].settings["lecture"])
+def sums_compared_short(core: Comparison) -> None:
+    """Only the lower n bits of SX and SY are compared."""
+    sx, sy = (register[: core.width] for register in core.sums.values())
+    dx, dy = _lengths(core)
+    _assign(core, core.turn, (sx < sy) | ((sx == sy) & (dx >= dy)))
+
+
+@_comparison({*ALL})
+def count_of_x_stuck(core: Comparison) -> None:
+    """P5 never counts down: no line along x ends."""
+    _assign(core, core.remaining["x"].count, 0)
+
+
+@_comparison({*ALL})
+def one_axis_ends_it(core: Comparison) -> None:
+    """A block ends when one of its counters is empty, not both."""
+    remaining = core.remaining
+    _assign(core, core.uu.ending, remaining["x"].ending | remaining["y"].ending)
+
+
+# The article judges the steps alone, not the coordinates, and knows of no second line.
+
+
+@_comparison({*ALL} - {DOCUMENTS})
+def coordinate_too_soon(core: Comparison) -> None:
+    """P3 counts with the summation, a clock before its step can be taken."""
+    step, negative = core.output.carry.x, core.output.direction_registers["x"]
+    _assign(core, core.place["x"].up, step & ~negative)
+    _assign(core, core.place["x"].down, step & negative)
+
+
+@_comparison({*ALL} - {DOCUMENTS})
+def clock_lost_between_blocks(core: Comparison) -> None:
+    """The next block starts only when the last step before it has been taken."""
+    uu = core.uu
+    _assign(uu, uu.start, uu.pending & ~uu.running & ~uu.waiting)
+
+
+# Only with the right stimuli: neither the article nor the survey stalls, errs or resets.
+
+
+@_comparison({*ALL} - {DOCUMENTS, COMPILED})
+def comparison_step_lost_under_stall(core: Comparison) -> None:
+    """A step that is not taken is forgotten, and the next one is computed."""
+    _assign(core, core.uu.ready, 1)
+
+
+@_comparison({*ALL} - {DOCUMENTS, COMPILED})
+def comparison_fault_not_raised(core: Comparison) -> None:
+    """A block that is too long is run with the low bits of its lengths."""
+    _assign(core, core.uu.fault, ErrorCode.NONE)
+
+
+@_comparison({EQUIVALENCE} | VERILOG)
+def waiting_step_not_reset(core: Comparison) -> None:
+    """A step of y that waits survives a reset, and is taken after it."""
+    fresh = Signal.like(core.registers["pulse_y"], name="pulse_y", reset_less=True)
+    core.registers["pulse_y"] = core.output.pulse_registers["y"] = fresh
+
+
+# No simulation sees these: a line leaves S at 0, where the next one starts, and the benches that
+# reset a running line look at the outputs alone.
+
+
+@_comparison({EQUIVALENCE, PROMISES})
+def sum_not_cleared(core: Comparison) -> None:
+    """Only reset sets S to 0; a block starts from what the one before left."""
+
+    def change(m: Module) -> None:
+        with m.If(core.uu.load):
+            m.d.sync += core.sums["s"].eq(core.sums["s"])
+
+    _amend(core, change)
+
+
+@_comparison({EQUIVALENCE})
+def sum_not_reset(core: Comparison) -> None:
+    """S survives a reset, until the next block starts."""
+    fresh = Signal.like(core.sums["s"], name="s", reset_less=True)
+    core.registers["s"] = core.sums["s"] = fresh
+
+
+# Equal to its golden model, and wrong: the survey's bound holds on both sides of a line.
+
+
+class _FirstMisread(GoldenComparison):
+    """The mistake of :func:`first_misread`, made a second time."""
+
+    def summed(self, state, clock):
+        return GoldenComparison(self.width, "signed", "y").summed(state, clock)
+
+
+@_comparison({DOCUMENTS, PROMISES}, golden=_FirstMisread)
+def first_misread(core: Comparison) -> None:
+    """Device and golden model both start with y at 45°, though it is x that was asked for."""
+    core.first = "y"

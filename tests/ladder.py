@@ -44,6 +44,7 @@ from tests.broken import ALL, SOUND, VARIANTS, Variant
 from tests.conics import FIELDS, conic_steps, draw_conics
 from tests.conics import fault as conic_fault
 from tests.hdl.traces import golden_trace
+from tests.lines import article
 
 __all__ = ["RUNGS", "matrix", "missing"]
 
@@ -60,7 +61,7 @@ _Said = tuple[str, list[tuple[int, tuple[int, ...]]]]
 def documents(variant: Variant) -> str:
     """Judge the steps of blocks, one behind the other, by what the documents say of each."""
     core = variant.device(WIDTH)
-    blocks, read = _DOCUMENTS[variant.method.curve]
+    blocks, read = _DOCUMENTS.get(variant.method.name) or _DOCUMENTS[variant.method.curve]
     said = [read(core, block) for block in blocks.tolist()]
     # Twice what it takes: a clock for every summation, and some for what comes before.
     clocks = [points[-1][0] if points else 0 for ((_, points), *_) in said]
@@ -141,6 +142,14 @@ def _closed_form(t: int, dx: int, dy: int, core: Part) -> list[int]:
 
 def _initial_sum(core: Part) -> int:
     return 0 if core.preload == "zero" else 2 ** (core.width - 1)
+
+
+def _comparison_documents(core: Part, block: list[int]) -> list[_Said]:
+    """Read the article's routine."""
+    xh, yh, xk, yk = block
+    x_leads = abs(xk - xh) - abs(yk - yh) + (core.parameters["first"] == "x") > 0
+    steps = [(t, (row[0], row[1])) for t, row in enumerate(article(block, x_leads=x_leads))]
+    return [("the article", steps[1:])]
 
 
 def _arc_documents(core: Part, block: list[int]) -> list[_Said]:
@@ -247,11 +256,13 @@ _FIELDS: dict[str, tuple[str, ...]] = {"line": ("start_x", "start_y", "end_x", "
 _FIELDS["arc"] = (*_FIELDS["line"], "center_x", "center_y", "clockwise", "full_turns")
 _FIELDS["conic"] = FIELDS
 
-#: By the kind of curve: what the documents are asked, and how they are read.
+#: By the kind of curve, or by the method if it has documents of its own: what the documents are
+#: asked, and how they are read.
 _DOCUMENTS = {
     "line": (_lines(), _line_documents),
     "arc": (_sound_arcs(), _arc_documents),
     "conic": (_sound_conics(), _conic_documents),
+    "comparison": (_lines(), _comparison_documents),
 }
 
 #: By the kind of curve: the blocks of the benches that know everything.

@@ -52,3 +52,22 @@ def distance(point: Sequence[int], start: Sequence[int], end: Sequence[int]) -> 
     d = [b - a for a, b in zip(start, end, strict=True)]
     along = sum(a * b for a, b in zip(p, d, strict=True))
     return sqrt(Fraction(sum(a * a for a in p)) - Fraction(along**2, sum(a * a for a in d)))
+
+
+def article(block: Sequence[int], *, x_leads: bool) -> Iterator[tuple[int, int, int, int, int]]:
+    """Run the article's routine; yield x, y, Sx, Sy, Sx − Sy at the start and after every step.
+
+    ``x_leads``: x goes first, as the longer axis, or at 45° by choice.
+    """
+    x, y, end_x, end_y = block
+    dx, dy = abs(end_x - x), abs(end_y - y)
+    sx = sy = 0
+    yield x, y, sx, sy, sx - sy
+    while (x, y) != (end_x, end_y):
+        if sx < sy or (sx == sy and x_leads):
+            x += 1 if end_x > x else -1
+            sx += dy
+        else:
+            y += 1 if end_y > y else -1
+            sy += dx
+        yield x, y, sx, sy, sx - sy

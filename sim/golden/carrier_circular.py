@@ -112,7 +112,10 @@ class CarrierCircular:
         program: list[tuple[str, str | int | tuple[int, ...], str]] = []
         program.append(("angle", "angle", "square"))
         # 2(1 − cos a) = a² − 2a⁴/4! + 2a⁶/6! − …, sin a = a − a³/3! + a⁵/5! − …
-        for first, what, divisors in (("square", "kappa", (56, 30, 12)), ("angle", "sine", (42, 20, 6))):
+        for first, what, divisors in (
+            ("square", "kappa", (56, 30, 12)),
+            ("angle", "sine", (42, 20, 6)),
+        ):
             if self.coefficient == "series":
                 for divisor in divisors:
                     program.append(("square", "term", "scaled"))
@@ -251,7 +254,9 @@ class CarrierCircular:
         multiplying = going & negate(equal(state["digit"], 0))
         finish = going & equal(state["digit"], 0)
         after = dict(state)
-        after["digit"] = where(multiplying, state["digit"] - 1, where(finish, self.bits, state["digit"]))
+        after["digit"] = where(
+            multiplying, state["digit"] - 1, where(finish, self.bits, state["digit"])
+        )
         bit = state["factor"] & 1
         begun = equal(state["pass"], 0) if self.formula != "plain" else 1
         turned = {
@@ -380,7 +385,9 @@ class CarrierCircular:
         rest = where(fits, brought - state["next_periods"], brought) & (2 ** (n + 8) - 1)
         quotient = (2 * state["quotient_angle"] + fits) & (2**wide - 1)
         dividend = (self._swept(state) << (self.bits - n - 16)) & (2**wide - 1)
-        after["quotient_angle"] = where(loading, dividend, where(dividing, quotient, state["quotient_angle"]))
+        after["quotient_angle"] = where(
+            loading, dividend, where(dividing, quotient, state["quotient_angle"])
+        )
         after["rest_angle"] = where(loading, 0, where(dividing, rest, state["rest_angle"]))
         if self.formula == "rotation":
             after |= self._coefficient(state, equal(stage, self.divided))

@@ -49,6 +49,11 @@ class CarrierLinear:
         return self.width + 12
 
     @property
+    def least_period(self) -> int:
+        """Clocks that a period must have."""
+        return 2
+
+    @property
     def initial_fraction(self) -> int:
         """What the fractions start from."""
         return {"zero": 0, "half": 2 ** (self.fraction_bits - 1)}[self.preload]

@@ -7,7 +7,6 @@ accumulators SX and SY, or their difference S alone.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from discreta.sim.golden.line_frame import LineFrame, State
 from discreta.sim.golden.logic import Value, equal, less, negate, where
@@ -32,8 +31,6 @@ class Comparison(LineFrame):
     width: int = 16
     form: str = "signed"
     first: str = "x"
-
-    axes: ClassVar[int] = 2
 
     def sums(self) -> dict[str, tuple[int, bool]]:
         """Give the width in bits of every summator and whether it is signed."""

@@ -27,7 +27,7 @@ class LineFrame:
     """
 
     width: int
-    axes: int
+    axes: int = 2
 
     @property
     def letters(self) -> str:

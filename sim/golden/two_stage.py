@@ -93,6 +93,9 @@ class TwoStage:
         clock = state["fine_running"] & free
         last_clock = equal(state["clocks_left"], 1)
         take = state["waiting"] & free & (negate(state["fine_running"]) | last_clock)
+        # A new block loads the position: the one before it has to be done with it.
+        closes = negate(state["open"]) | (taken & state["step_last"])
+        take = take & (negate(state["fine_last"]) | closes)
         first = self.coarse.outputs(state, state["open"])
         begins_empty = (
             self.coarse.start(state, take, state["open"])
@@ -102,10 +105,7 @@ class TwoStage:
         after = self.coarse.step(state, inputs | {"steps_ready": take}, state["open"])
 
         nothing = equal(first["steps_x"], 0) & equal(first["steps_y"], 0)
-        stepless = take & first["steps_last"] & nothing
-        answered = (taken & state["step_last"]) | stepless | begins_empty
-        after["fine_done"] = answered
-        after["open"] = where(take, negate(stepless), where(answered, 0, state["open"]))
+        nothing_more = take & first["steps_last"] & nothing
 
         # A period lasts T clocks, or as many as it has steps.
         lengths = {
@@ -123,9 +123,11 @@ class TwoStage:
 
         # Lecture, steps 8 to 10: add, look for a carry, move, count down.
         all_gone: Value = 1
+        some_carry: Value = 0
         for a, (increment, left) in NAMES.items():
             total = state[f"fine_s{a}"] + state[increment]
             carry = clock & negate(less(total, state["span"]))
+            some_carry = some_carry | carry
             rest = where(carry, total - state["span"], total) & (2**self.bits - 1)
             summed = where(clock, rest, state[f"fine_s{a}"])
             preload = span >> 1 if self.coarse.preload == "half" else 0
@@ -143,7 +145,14 @@ class TwoStage:
             moved = where(taken, moved, state[f"{a}t"])
             moved = where(take & state["fine_last"], first[f"position_{a}"], moved)
             after[f"{a}t"] = where(begins_empty, state[f"start_{a}"], moved)
-        after["step_last"] = where(clock, state["fine_last"] & all_gone, state["step_last"])
+        last = (state["fine_last"] & all_gone) | nothing_more
+        after["step_last"] = where(clock, last, state["step_last"])
+
+        # A block without a last step is answered at once.
+        stepless = nothing_more & negate(some_carry)
+        answered = (taken & state["step_last"]) | stepless | begins_empty
+        after["fine_done"] = answered
+        after["open"] = where(take, negate(stepless), where(answered, 0, state["open"]))
         return after
 
     def _waiting(self, state: State) -> Value:

@@ -3,10 +3,9 @@
 They are shown of the golden model's own source, which the device is proven equal to. Two kinds:
 
 - about the registers, in bit-vectors: an invariant is shown to hold after reset and to survive
-every
-  clock from every state that satisfies it, whatever the inputs; the promises follow from it. A few
-  ghost values remember what the registers forget: where the running block began (``begin``), ends
-  (``end``), how many summations it has had (``t``), and where the prepared one ends (``next_end``);
+  every clock from every state that satisfies it, whatever the inputs; the promises follow from it.
+  A few ghost values remember what the registers forget: where the running block began (``begin``)
+  and ends (``end``), and where the prepared one ends (``next_end``);
 - about numbers, in integers and reals, where lengths are multiplied. What the bit-vectors take over
   from there is :func:`_meant`: the axis that is to step has steps left.
 
@@ -171,7 +170,6 @@ class _Registers:
             for ghost in ("begin", "end", "next_end")
             for a in "xy"
         }
-        self.ghosts["t"] = extend(z3.BitVec("ghost.t", n + 1), False, self.wide)
 
         self.outputs = golden.outputs(self.state)
         free = negate(self.outputs["steps_valid"]) | self.inputs["steps_ready"]
@@ -191,10 +189,7 @@ class _Registers:
 
         self.after = golden.step(self.state, self.inputs)
         ghosts, state = self.ghosts, self.state
-        zero = z3.BitVecVal(0, self.wide)
-        self.ghosts_after: dict[str, Value] = {
-            "t": z3.If(self.load, zero, ghosts["t"] + z3.If(self.sums, zero + 1, zero))
-        }
+        self.ghosts_after: dict[str, Value] = {}
         for a in "xy":
             self.ghosts_after |= {
                 f"begin_{a}": z3.If(self.load, state[f"start_{a}"], ghosts[f"begin_{a}"]),
@@ -222,7 +217,6 @@ class _Registers:
             "a prepared block is rejected exactly when an axis is too long": state["fault"]
             == z3.If(z3.Or(too_long), z3.BitVecVal(1, self.wide), z3.BitVecVal(0, self.wide)),
             "a step of one axis waits, not of two": state["pulse_x"] + state["pulse_y"] <= 1,
-            "every summation was a step": ghosts["t"] == axes[0].put_out() + axes[1].put_out(),
         }
         for a, axis in zip("xy", axes, strict=True):
             facts |= {
@@ -252,7 +246,7 @@ class _Registers:
         emptied = z3.And(self.load, self.empty)
         rejected = z3.And(self.start, self.fault)
         idle = z3.And(self.state["running"] == 0, self.state["pending"] == 1)
-        lengths = [axis.increment for axis in before]
+        left, left_after = (axes[0].left + axes[1].left for axes in (before, after))
         turn = _x_turn(self.state, golden.first)
         s, s_after = _difference(self.state), _difference(self.after)
         return [
@@ -331,19 +325,26 @@ class _Registers:
                 ),
             ),
             Obligation(
-                "end: when a block is done its end point is reached exactly, after just ΔX + ΔY "
-                "summations",
+                "end: when a block is done its end point is reached exactly",
                 [*known, ended],
                 [
                     self.after["done"] == 1,
-                    self.ghosts["t"] == lengths[0] + lengths[1],
                     *[old.position + outputs[f"steps_{a}"] == old.end for a, old, _ in pairs],
                 ],
             ),
             Obligation(
-                "it always ends: an axis with steps left has had fewer than ΔX + ΔY summations",
-                [*known, self.state["running"] == 1],
-                [self.ghosts["t"] < lengths[0] + lengths[1]],
+                "it always ends: KOX + KOY starts from ΔX + ΔY and falls by just 1 with every "
+                "summation, and a block runs until it is 0: so there are just ΔX + ΔY of them",
+                known,
+                {
+                    "start": z3.Implies(
+                        self.load,
+                        left_after == self.state["delta_x"] + self.state["delta_y"],
+                    ),
+                    "summation": z3.Implies(self.sums, left_after == left - 1),
+                    "none": z3.Implies(z3.Not(z3.Or(self.load, self.sums)), left_after == left),
+                    "end": (self.state["running"] == 1) == (left != 0),
+                },
             ),
             Obligation(
                 "answer: done or error just one clock after a last step is taken, a block of no "
