@@ -255,9 +255,9 @@ def check_timing(
         for index in np.flatnonzero(blocks[:, -2] < least)[:1]:
             block = blocks[index].tolist()
             raise BadInputError(
-                f"{_name(kind, block)} takes {block[-2]} periods, and by its angle of "
-                f"{float(angles(blocks[index : index + 1])[0]):.4f} formula {formula} needs "
-                f"{least[index]} or more: too few periods; lower --speed or --period"
+                f"{_name(kind, block)} has {float(angles(blocks[[index]])[0]):.4f} radians and so "
+                f"needs {least[index]} periods or more with formula {formula}, where it takes "
+                f"{block[-2]}: too few periods; lower --speed or --period"
             )
     return blocks
 

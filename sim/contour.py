@@ -96,6 +96,9 @@ class Contour(ABC):
     reached : array of bool, shape (blocks,)
         Blocks whose end point was reached exactly with their last step; of those of no length, the
         ones answered by ``done`` without a step.
+    done_ends : bool
+        A block that moved may also end with its answer, ``done``, when no step of it was ``last``,
+        as in two stages. False unless it is set before the first stretch.
     """
 
     def __init__(self, starts: np.ndarray, ends: np.ndarray, empty: np.ndarray):
@@ -107,7 +110,12 @@ class Contour(ABC):
         self.block_errors = np.zeros(len(starts))
         self.block_steps = np.zeros(len(starts), dtype=np.int64)
         self.reached = np.zeros(len(starts), dtype=bool)
+        self.done_ends = False
         self._empty = empty
+        #: Where the last step of every block has led.
+        self._places = starts.copy()
+        #: The blocks of which a step was the last one.
+        self._closed = np.zeros(len(starts), dtype=bool)
         #: The clock of every block's last step; without one, of its answer.
         self._ended = np.zeros(len(starts), dtype=np.int64)
         self._accepted: int | None = None
@@ -172,12 +180,17 @@ class Contour(ABC):
         last = stretch.events[taken, fields + axes] == 1
         reached = np.all(points == self.ends[which], axis=1) & ~self._empty[which]
         self.reached[which[last]] = reached[last]
+        self._closed[which[last]] = True
         self._ended[which] = when
+        self._places[which] = points
 
         still = self.block_steps[answered] == 0
         self._ended[answered[still]] = column["clock"][answers][still]
         done = still & (column["done"][answers] == 1)
         self.reached[answered[done]] = self._empty[answered[done]]
+        if self.done_ends:
+            ended = answered[~still & ~self._closed[answered] & (column["done"][answers] == 1)]
+            self.reached[ended] = np.all(self._places[ended] == self.ends[ended], axis=1)
         if len(when):
             self.clocks = int(when[-1]) - accepted
         return when - accepted, points, errors

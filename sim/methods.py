@@ -20,6 +20,7 @@ from discreta.hdl.conic import ORDERS as CONIC_ORDERS
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import MAX_WIDTH, Part
 from discreta.hdl.linear import Linear
+from discreta.hdl.two_stage import two_stage_circular, two_stage_linear
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
 from discreta.sim.conics import motion
 from discreta.sim.golden.carrier_circular import CarrierCircular as GoldenCarrierCircular
@@ -28,6 +29,9 @@ from discreta.sim.golden.circular import Circular as GoldenCircular
 from discreta.sim.golden.comparison import Comparison as GoldenComparison
 from discreta.sim.golden.conic import Conic as GoldenConic
 from discreta.sim.golden.linear import Linear as GoldenLinear
+from discreta.sim.golden.two_stage import TwoStage as GoldenTwoStage
+from discreta.sim.golden.two_stage import two_stage_circular as golden_two_stage_circular
+from discreta.sim.golden.two_stage import two_stage_linear as golden_two_stage_linear
 
 __all__ = ["METHODS", "Method"]
 
@@ -71,6 +75,8 @@ class Method:
     differs : callable
         ``differs(choices)``: whether this combination of choices makes a machine that no other one
         makes, to be surveyed and proven.
+    proofs : str or None
+        The module of :mod:`discreta.sim.proofs` with what is promised; None: that of its name.
     """
 
     name: str
@@ -89,6 +95,7 @@ class Method:
     timed: bool = False
     per_period: bool = False
     differs: Callable[[dict[str, Any]], bool] = lambda _: True
+    proofs: str | None = None
 
     def core(self, width: int, axes: int = 2, **choices: Any) -> Part:
         """Make the RTL; ``TypeError`` or ``ValueError`` for what its constructor refuses."""
@@ -104,8 +111,12 @@ class Method:
 
     def promises(self, golden: Any) -> list:
         """Give what is proven of the method beyond its equality to the golden model."""
+        return self.proof_module().promises(golden)
+
+    def proof_module(self) -> Any:
+        """Give the module with the proofs of what is promised."""
         # Only the prover needs the solver.
-        return import_module(f"discreta.sim.proofs.{self.name}").promises(golden)
+        return import_module(f"discreta.sim.proofs.{self.proofs or self.name}")
 
     def variants(self) -> list[dict[str, Any]]:
         """Give every combination of the choices that makes another machine."""
@@ -208,6 +219,25 @@ def _carrier_circular_clocks(golden: GoldenCarrierCircular, blocks: np.ndarray) 
     if golden.formula == "rotation":
         preparation += len(golden.program) * (golden.bits + 2)
     return blocks[:, -2] * blocks[:, -1] + preparation + golden.least_period + _AROUND
+
+
+def _two_stage_linear_clocks(golden: GoldenTwoStage, blocks: np.ndarray) -> np.ndarray:
+    """What the first stage takes, a period more, and as many clocks as there are steps."""
+    steps = np.sum(np.abs(blocks[:, 2:4] - blocks[:, :2]), axis=1)
+    return _carrier_linear_clocks(golden.coarse, blocks) + blocks[:, -1] + steps + _AROUND
+
+
+def _two_stage_linear_bound(golden: GoldenTwoStage) -> float:
+    """What the first stage has on an axis, and half a step to either side or one behind."""
+    return math.sqrt(2) * 17 / 16 if golden.preload == "half" else 33 / 16
+
+
+def _two_stage_circular_clocks(golden: GoldenTwoStage, blocks: np.ndarray) -> np.ndarray:
+    """What the first stage takes, a period more, and as many clocks as there are steps."""
+    radius = np.hypot(*(blocks[:, :2] - blocks[:, 4:6]).T.astype(float))
+    # Twice the axes' ways of whole turns, since the radius may grow.
+    steps = (16 * (radius + 1) * (blocks[:, 7] + 1)).astype(np.int64)
+    return _carrier_circular_clocks(golden.coarse, blocks) + blocks[:, -1] + steps + _AROUND
 
 
 def _uses_its_coefficient(choices: dict[str, Any]) -> bool:
@@ -368,6 +398,52 @@ METHODS = {
             timed=True,
             per_period=True,
             differs=_uses_its_coefficient,
+        ),
+        Method(
+            name="two_stage_linear",
+            curve="line",
+            summary="line on a constant carrier, its steps spread evenly over every period",
+            error_bound="33/16 (preload zero), 1.50 (half)",
+            clocks_per_step="as timed: a period of T clocks for up to F·T steps",
+            device=two_stage_linear,
+            golden=golden_two_stage_linear,
+            axes=(2,),
+            choices={"preload": ("half", "zero")},
+            settings={"default": {"preload": "half"}, "lecture": CarrierLinear.LECTURE},
+            clocks=_two_stage_linear_clocks,
+            bound=_two_stage_linear_bound,
+            max_width=CARRIER_LINEAR_MAX_WIDTH,
+            timed=True,
+            proofs="two_stage",
+        ),
+        Method(
+            name="two_stage_circular",
+            curve="arc",
+            summary="arc on a constant carrier, its steps spread evenly over every period",
+            error_bound="-",
+            clocks_per_step="as timed: a period of T clocks for up to F·T steps",
+            device=two_stage_circular,
+            golden=golden_two_stage_circular,
+            axes=(2,),
+            choices={
+                "formula": FORMULAS,
+                "coefficient": COEFFICIENTS,
+                "preload": ("half", "zero"),
+            },
+            settings={
+                "default": {
+                    "formula": "rotation",
+                    "coefficient": "series",
+                    "preload": "half",
+                },
+                "lecture": CarrierCircular.LECTURE,
+            },
+            clocks=_two_stage_circular_clocks,
+            bound=lambda _: None,
+            max_width=CARRIER_CIRCULAR_MAX_WIDTH,
+            timed=True,
+            differs=_uses_its_coefficient,
+            proofs="two_stage",
         ),
     )
 }

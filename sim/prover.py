@@ -1,6 +1,5 @@
 """Proves a method part by part; a process of its own for each uses all cores."""
 
-from importlib import import_module
 from typing import Any
 
 from discreta.sim.methods import METHODS
@@ -11,7 +10,7 @@ __all__ = ["prove_variant", "shares"]
 
 def shares(name: str) -> bool:
     """Tell whether something is promised of all variants of a method alike."""
-    return hasattr(import_module(f"discreta.sim.proofs.{name}"), "shared")
+    return hasattr(METHODS[name].proof_module(), "shared")
 
 
 def prove_variant(name: str, width: int, variant: dict[str, Any] | None) -> list[Verdict]:
@@ -22,7 +21,7 @@ def prove_variant(name: str, width: int, variant: dict[str, Any] | None) -> list
     method = METHODS[name]
     if variant is None:
         golden = method.model(width, **method.settings["default"])
-        obligations = import_module(f"discreta.sim.proofs.{name}").shared(golden)
+        obligations = method.proof_module().shared(golden)
     else:
         golden = method.model(width, **variant)
         obligations = equivalence(method.core(width, **variant), golden)

@@ -121,6 +121,7 @@ def run(
     blocks = _timed(curve, golden, width, speed, period) if method.timed else curve.blocks
     limit = int(method.clocks(golden, blocks).sum()) + _OVERHEAD
     contour, pace = curve.contour(), None if method.timed else Pace()
+    contour.done_ends = method.timed and not method.per_period
     picture = PathPlot(curve, periods=method.per_period)
     steps, here = 0, curve.start[None]
     with Outputs(reads) as outputs:

@@ -432,6 +432,7 @@ class _Judge:
         self._blocks, self._golden = blocks, golden
         self.names = tuple(golden.registers()) if golden else self._curve.watch
         self.contour = self._curve.contour(blocks)
+        self.contour.done_ends = method.timed and not method.per_period
         self.clocks = self.summations = 0
         self.findings: list[str] = []
         self.completed = np.zeros(len(blocks), dtype=bool)

@@ -75,6 +75,9 @@ class Variant:
         return self.method.model(width, **self.options)
 
 
+#: Arcs on a carrier by the formula that is quickest to prepare and to run.
+PLAIN = {"formula": "plain", "coefficient": "series", "preload": "half"}
+
 SOUND = [
     Variant(METHODS["linear"], "sound line", "nothing: normalized, preload half"),
     Variant(
@@ -103,6 +106,33 @@ SOUND = [
         "sound conic, lecture",
         "nothing: summed as in the lecture's block diagram",
         options=METHODS["conic"].settings["lecture"],
+    ),
+    Variant(METHODS["carrier_linear"], "sound carrier line", "nothing: preload half"),
+    Variant(
+        METHODS["carrier_linear"],
+        "sound carrier line, lecture",
+        "nothing: preload zero",
+        options=METHODS["carrier_linear"].settings["lecture"],
+    ),
+    Variant(
+        METHODS["carrier_circular"],
+        "sound carrier arc",
+        "nothing: the plain formula, preload half",
+        options=PLAIN,
+    ),
+    Variant(
+        METHODS["carrier_circular"],
+        "sound carrier arc, lecture",
+        "nothing: the plain formula, preload zero",
+        options=METHODS["carrier_circular"].settings["lecture"],
+    ),
+    Variant(METHODS["carrier_circular"], "sound carrier arc, rotation", "nothing: the default"),
+    Variant(METHODS["two_stage_linear"], "sound two-stage line", "nothing: preload half"),
+    Variant(
+        METHODS["two_stage_circular"],
+        "sound two-stage arc",
+        "nothing: the plain formula, preload half",
+        options=PLAIN,
     ),
 ]
 VARIANTS: list[Variant] = []

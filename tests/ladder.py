@@ -6,15 +6,16 @@ ladder and prints what is seen, then which rungs catch which variant, as a Markd
 method.
 """
 
+import math
 import os
 import sys
 import textwrap
 from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from fractions import Fraction
 from functools import cache
-from importlib import import_module
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 from unittest.mock import patch
 
@@ -33,13 +34,13 @@ from discreta.sim import survey
 from discreta.sim.foreign import UnknownOutputError, available, run_foreign
 from discreta.sim.groups import survey_groups
 from discreta.sim.interpreted import PysimModel
-from discreta.sim.methods import METHODS
+from discreta.sim.methods import METHODS, Method
 from discreta.sim.simulate import DeadCoreError, simulate
 from discreta.sim.smt import Obligation, Rtl, check, equivalence, extend
 from discreta.sim.stalls import NO_STALLS, Stalls
 from discreta.sim.stretch import EVENT_COLUMNS
 from tests import lecture
-from tests.arcs import arc_steps, draw_arcs, fault
+from tests.arcs import arc_steps, draw_arcs, fault, is_empty, seen
 from tests.broken import ALL, SOUND, VARIANTS, Variant
 from tests.conics import FIELDS, conic_steps, draw_conics
 from tests.conics import fault as conic_fault
@@ -55,7 +56,13 @@ SEED = 1970
 _CLOCK_LIMIT = 9000
 
 #: What a document says of a block: its name, and (summations, point) of every step, from the first.
+#: On a carrier it is (clocks, point) of every period.
 _Said = tuple[str, list[tuple[int, tuple[int, ...]]]]
+
+
+def _kind(method: Method) -> str:
+    """Name the kind of blocks of a method: the curve, and whether it is timed."""
+    return f"timed {method.curve}" if method.timed else method.curve
 
 
 def documents(variant: Variant) -> str:
@@ -65,7 +72,7 @@ def documents(variant: Variant) -> str:
     said = [read(core, block) for block in blocks.tolist()]
     # Twice what it takes: a clock for every summation, and some for what comes before.
     clocks = [points[-1][0] if points else 0 for ((_, points), *_) in said]
-    limit = 2 * (sum(clocks) + len(blocks) * (2 * WIDTH + 8))
+    limit = 2 * (sum(clocks) + len(blocks) * (2 * WIDTH + 8 + _preparation(core)))
     try:
         events = np.concatenate([part.events for part in simulate(core, blocks, limit=limit)])
     except DeadCoreError as error:
@@ -78,7 +85,7 @@ def documents(variant: Variant) -> str:
         rows, taken = taken[: len(points)], taken[len(points) :]
         if len(rows) < len(points):
             return f"{name} takes {len(rows)} steps, where {sources[0][0]} has {len(points)}"
-        start = _FIELDS[variant.method.curve].index("start_x")
+        start = _FIELDS[_kind(variant.method)].index("start_x")
         seen = (block[start : start + 2] + np.cumsum(rows[:, 1:3], axis=0)).tolist()
         for source, points in sources:
             for (t, point), (clock, *_), at in zip(points, rows.tolist(), seen, strict=True):
@@ -92,6 +99,14 @@ def documents(variant: Variant) -> str:
         if rows[:, 3].tolist() != [0] * (len(rows) - 1) + [1] * (len(rows) > 0):
             return f"{name} has last = {rows[:, 3].tolist()}"
     return f"{len(taken)} steps after the last {variant.method.curve}" if len(taken) else ""
+
+
+def _preparation(core: Any) -> int:
+    """Give the clocks that a block on a carrier takes before its first period."""
+    coarse = getattr(core, "coarse", core)
+    if not hasattr(coarse, "least_period"):
+        return 0
+    return coarse.least_period + getattr(coarse, "preparation", 2 * WIDTH + 14)
 
 
 def _line_documents(core: Part, block: list[int]) -> list[_Said]:
@@ -185,6 +200,139 @@ def _conic_documents(core: Part, block: list[int]) -> list[_Said]:
     return [("the rule", [(clock - core.width - 5, point) for clock, point in steps])]
 
 
+def _carrier_line_documents(core: Part, block: list[int]) -> list[_Said]:
+    """Read the rule: whole parts of the fraction kept and the mean increments, in exact numbers."""
+    points = _line_periods(core, block)
+    return [("the rule", [(i * block[-1], point) for i, point in enumerate(points)])]
+
+
+def _line_periods(core: Part, block: list[int]) -> list[tuple[int, ...]]:
+    """Give the point after every period of a line, until it comes to its end."""
+    xh, yh, xk, yk, periods, _ = block
+    deltas, points = (xk - xh, yk - yh), []
+    kept = Fraction(0) if core.preload == "zero" else Fraction(1, 2)
+    # Mean increments have n + 12 bits of fraction; what is below them is lost.
+    one = 1 << (core.width + 12)
+    means = [Fraction(math.floor(Fraction(abs(delta), periods) * one), one) for delta in deltas]
+    for i in range(1, periods + 1):
+        gone = [math.floor(kept + i * mean) for mean in means]
+        if i == periods:
+            gone = [abs(delta) for delta in deltas]
+        points.append(
+            tuple(
+                begin + math.copysign(1, delta) * way
+                for begin, delta, way in zip((xh, yh), deltas, gone, strict=True)
+            )
+        )
+        if gone == [abs(delta) for delta in deltas]:
+            break
+    return points if any(deltas) else []
+
+
+def _carrier_arc_documents(core: Part, block: list[int]) -> list[_Said]:
+    """Read the formula, in floating point and with the arc's true angle."""
+    points = _arc_periods(core, block)
+    return [("the formula", [(i * block[-1], point) for i, point in enumerate(points)])]
+
+
+#: What the device's angle, and the bits of its numbers, may move a point by, in steps. No point of
+#: the blocks that the documents are asked is so near to the next whole number.
+_ANGLE_SLACK = 0.03
+
+
+def _arc_periods(core: Part, block: list[int]) -> list[tuple[int, ...]]:
+    """Give the point after every period of an arc, until it comes to its end.
+
+    A whole number may be told from the formula only where it is not nearly another one.
+    """
+    if is_empty(block[:8]):
+        return []
+    _, _, *end, xc, yc, clockwise, full_turns, periods, _ = block
+    (x, y), finish = seen(block[:8])
+    angle = (math.atan2(finish[1], finish[0]) - math.atan2(y, x)) % (2 * math.pi)
+    u = (angle + 2 * math.pi * full_turns) / periods
+    # By its own rule a clockwise arc is mirrored in the products' signs alone.
+    side = -1 if clockwise else 1
+    x, y, u = float(x), float(side * y), side * u
+    before = x * math.cos(u) + y * math.sin(u), y * math.cos(u) - x * math.sin(u)
+    kept, top, points = 0.5 if core.preload == "half" else 0.0, 2**core.width - 1, []
+    for i in range(1, periods + 1):
+        if core.formula == "plain":
+            later = x - y * u, y + x * u
+        elif core.formula == "predictor_corrector":
+            predicted = x - y * u, y + x * u
+            later = x - (y + predicted[1]) / 2 * u, y + (x + predicted[0]) / 2 * u
+        else:
+            kappa = 2 * (1 - math.cos(u))
+            later = 2 * x - before[0] - kappa * x, 2 * y - before[1] - kappa * y
+        before, (x, y) = (x, y), later
+        whole = [math.floor(value + kept) for value in (x, y)]
+        if i == periods:
+            points.append(tuple(end))
+            break
+        for value, floor in zip((x, y), whole, strict=True):
+            # In the first period of the plain formula an axis may stand still on its whole number.
+            near = min(value + kept - floor, floor + 1 - value - kept)
+            assert near > _ANGLE_SLACK or (i == 1 and near == 0), (block, i, value)
+        points.append(
+            tuple(
+                min(max(center + value, -1 - top), top)
+                for center, value in zip((xc, yc), whole, strict=True)
+            )
+        )
+        if i == periods - 1 and points[-1] == tuple(end):
+            break
+    return points
+
+
+def _two_stage_line_documents(core: Any, block: list[int]) -> list[_Said]:
+    """Read the rule of the second stage, fed by that of the first."""
+    return [("the rule", list(_spread(core, block, _line_periods(core.coarse, block))))]
+
+
+def _two_stage_arc_documents(core: Any, block: list[int]) -> list[_Said]:
+    """Read the rule of the second stage, fed by the first one's golden model."""
+    return [("the second stage's rule", list(_spread(core, block, _golden_arc_periods(core, block))))]
+
+
+def _golden_arc_periods(core: Any, block: list[int]) -> list[tuple[int, ...]]:
+    """Give the point after every period of an arc that the golden model has."""
+    golden = METHODS["carrier_circular"].model(**core.parameters)
+    state, fed, points = golden.reset(), 0, []
+    inputs = {f"blocks_{name}": value for name, value in zip(_FIELDS["timed arc"], block, strict=True)}
+    while not state["done"]:
+        out = golden.outputs(state)
+        assert not out["error"]
+        if out["steps_valid"]:
+            points.append((out["position_x"] + out["steps_x"], out["position_y"] + out["steps_y"]))
+        state = golden.step(state, inputs | {"blocks_valid": int(not fed), "steps_ready": 1})
+        fed = 1
+    return points
+
+
+def _spread(
+    core: Any, block: list[int], points: list[tuple[int, ...]]
+) -> Iterator[tuple[int, tuple[int, ...]]]:
+    """Give clock and point of every step: increments summed modulo as many clocks as a period has.
+
+    That is T, or the steps of the axis that has more of them.
+    """
+    place, began = list(block[:2]), 0
+    for before, after in pairwise([tuple(place), *points]):
+        ways = [int(b - a) for a, b in zip(before, after, strict=True)]
+        modulus = max(block[-1], *map(abs, ways))
+        sums = [0 if core.coarse.preload == "zero" else modulus // 2] * 2
+        for clock in range(1, modulus + 1):
+            carries = []
+            for axis, way in enumerate(ways):
+                carry, sums[axis] = divmod(sums[axis] + abs(way), modulus)
+                carries.append(carry)
+                place[axis] += carry if way > 0 else -carry
+            if any(carries):
+                yield began + clock, tuple(place)
+        began += modulus
+
+
 def _line_blocks() -> np.ndarray:
     """Draw lines of all kinds: every fourth of no length, some too long to run."""
     random = np.random.default_rng(SEED)
@@ -246,6 +394,75 @@ def _sound_conics() -> np.ndarray:
     return np.array([*sound, *_NAMED_CONICS])
 
 
+#: Fields before ``periods`` and ``period`` of lines on a carrier of the benches that need a name:
+#: a mean that is rounded down at a half; half a step in two periods; more steps than clocks.
+_NAMED_TIMED_LINES = [
+    (3, -2, 8, -2, 6, 5),
+    (0, 0, 1, -2, 6, 4),
+    (-7, 4, -7, 5, 2, 12),
+    (-9, 3, 4, -12, 2, 3),
+    (2, 1, 13, 6, 1, 2),
+]
+
+
+def _timed_lines() -> np.ndarray:
+    """Give lines of all kinds on a carrier that are not refused: one of five of no length."""
+    random = np.random.default_rng(SEED)
+    starts = random.integers(-(2**WIDTH), 2**WIDTH, (30, 2))
+    ends = starts + random.integers(1 - 2**WIDTH, 2**WIDTH, (30, 2))
+    ends = np.clip(ends, -(2**WIDTH), 2**WIDTH - 1)
+    ends[::5] = starts[::5]
+    timing = np.column_stack([random.integers(1, 12, 30), random.integers(2, 12, 30)])
+    return np.vstack([_NAMED_TIMED_LINES, np.hstack([starts, ends, timing])])
+
+
+#: Timings that are refused: no periods, and periods too short.
+_BAD_LINE_TIMINGS = [(0, 5), (3, 1), (7, 0)]
+
+
+def _timed_line_blocks() -> np.ndarray:
+    """Draw lines of all kinds on a carrier, those that are refused among them."""
+    lines = _timed_lines()
+    too_long = [(-(2**WIDTH), 0, 2**WIDTH - 1, 3, 4, 6)]
+    bad = [(*lines[i, :4], *timing) for i, timing in enumerate(_BAD_LINE_TIMINGS)]
+    return np.vstack([lines[:12], too_long, lines[12:16], bad, lines[16:24]])
+
+
+#: Arcs on a carrier that the documents are asked: one that is led out of the coordinates, one
+#: clockwise, one of two crossings, one of no length, one whose end is a step outside, one of a
+#: single period, and one at whose end with preload half the period before the last has come.
+_NAMED_TIMED_ARCS = [
+    (15, 0, 0, 15, 0, 0, 0, 0, 4, 66),
+    (-4, 9, 4, 1, -4, 1, 1, 0, 4, 67),
+    (4, -4, -4, 4, -3, -3, 0, 0, 4, 72),
+    (2, 2, 2, 2, 2, 2, 0, 0, 3, 80),
+    (3, 4, 0, 6, 0, 0, 0, 0, 9, 70),
+    (12, 5, 10, 8, 0, 0, 0, 0, 1, 90),
+    (12, 5, 11, 7, 0, 0, 0, 0, 5, 66),
+]
+
+
+def _timed_arcs() -> np.ndarray:
+    """Give arcs on a carrier that are not refused."""
+    return np.array(_NAMED_TIMED_ARCS)
+
+
+def _timed_arc_blocks() -> np.ndarray:
+    """Give arcs of all kinds on a carrier, and such that are refused because of arc or timing."""
+    wide, clockwise, two, none, outside, single, arrives = map(list, _NAMED_TIMED_ARCS)
+    # Periods that only the plain formula has time for.
+    quick = [(5, 0, 0, 5, 0, 0, 0, 0, 5, 24), (*two[:8], 6, 25), (*single[:8], 2, 45)]
+    # No periods, a period too short, too few periods, an end off the curve, a centre too far off.
+    bad = [
+        (*wide[:8], 0, 70),
+        (*wide[:8], 4, 23),
+        (*two[:8], 3, 70),
+        (3, 4, 0, 9, 0, 0, 0, 0, 4, 70),
+        (-9, 0, 9, 0, 9, 0, 0, 0, 9, 70),
+    ]
+    return np.array([*quick, wide, bad[0], none, clockwise, two, *bad[1:], outside, single, arrives])
+
+
 def _lines() -> np.ndarray:
     """Give every line of the width, the line of no length last, behind one that moves."""
     return np.roll(survey_groups(METHODS["linear"], WIDTH)[0].blocks, -1, axis=0)
@@ -255,6 +472,8 @@ def _lines() -> np.ndarray:
 _FIELDS: dict[str, tuple[str, ...]] = {"line": ("start_x", "start_y", "end_x", "end_y")}
 _FIELDS["arc"] = (*_FIELDS["line"], "center_x", "center_y", "clockwise", "full_turns")
 _FIELDS["conic"] = FIELDS
+_FIELDS["timed line"] = (*_FIELDS["line"], "periods", "period")
+_FIELDS["timed arc"] = (*_FIELDS["arc"], "periods", "period")
 
 #: By the kind of curve, or by the method if it has documents of its own: what the documents are
 #: asked, and how they are read.
@@ -263,33 +482,46 @@ _DOCUMENTS = {
     "arc": (_sound_arcs(), _arc_documents),
     "conic": (_sound_conics(), _conic_documents),
     "comparison": (_lines(), _comparison_documents),
+    "carrier_linear": (_timed_lines(), _carrier_line_documents),
+    "carrier_circular": (_timed_arcs(), _carrier_arc_documents),
+    "two_stage_linear": (_timed_lines(), _two_stage_line_documents),
+    "two_stage_circular": (_timed_arcs(), _two_stage_arc_documents),
 }
 
 #: By the kind of curve: the blocks of the benches that know everything.
-_BLOCKS = {"line": _line_blocks(), "arc": _arc_blocks(), "conic": _conic_blocks()}
+_BLOCKS = {
+    "line": _line_blocks(),
+    "arc": _arc_blocks(),
+    "conic": _conic_blocks(),
+    "timed line": _timed_line_blocks(),
+    "timed arc": _timed_arc_blocks(),
+}
+
+#: The clocks of a reset in Verilog; and by the kind, if a block takes so long before it runs.
+_RESETS, _LATE_RESETS = (60, 150, 151), {"timed arc": (150, 620, 621)}
 
 
 @cache
 def _expected(
-    golden: Any, curve: str, stalls: Stalls, resets: tuple[int, ...] = ()
+    golden: Any, kind: str, stalls: Stalls, resets: tuple[int, ...] = ()
 ) -> tuple[np.ndarray, np.ndarray]:
     """Give the golden registers and outputs at every clock of the blocks of a kind."""
-    fields = [f"blocks_{name}" for name in _FIELDS[curve]]
+    fields = [f"blocks_{name}" for name in _FIELDS[kind]]
     return golden_trace(
-        golden, fields, _BLOCKS[curve], _CLOCK_LIMIT, stalls, resets, until_idle=True
+        golden, fields, _BLOCKS[kind], _CLOCK_LIMIT, stalls, resets, until_idle=True
     )
 
 
 def simulation(variant: Variant) -> str:
     """Compare every register and output at every clock in pysim, without and with stalls."""
-    curve = variant.method.curve
+    kind = _kind(variant.method)
     for stalls in (NO_STALLS, Stalls(seed=SEED, stall=0.4, gap=0.3)):
         golden = variant.golden(WIDTH)
         names = [f"reg_{name}" for name in golden.registers()]
         names += list(golden.outputs(golden.reset()))
-        expected = np.hstack(_expected(golden, curve, stalls))
+        expected = np.hstack(_expected(golden, kind, stalls))
         model = PysimModel(variant.device(WIDTH), watch=tuple(names))
-        seen = model.run(_BLOCKS[curve], len(expected), stalls=stalls).watch
+        seen = model.run(_BLOCKS[kind], len(expected), stalls=stalls).watch
         if finding := _difference(seen, expected, names):
             return finding
     return ""
@@ -306,13 +538,13 @@ def _difference(seen: np.ndarray, expected: np.ndarray, names: list[str]) -> str
     )
 
 
-#: By the kind of curve: the widths of rung 3.
-_EQUIVALENCE_WIDTHS = {"line": (WIDTH, 2 * WIDTH), "arc": (WIDTH,), "conic": (WIDTH,)}
+#: The widths of rung 3, by the kind of curve if they are more.
+_EQUIVALENCE_WIDTHS = {"line": (WIDTH, 2 * WIDTH)}
 
 
 def equivalence_by_proof(variant: Variant) -> str:
     """Prove the device equal to the golden model, for all states and inputs."""
-    for width in _EQUIVALENCE_WIDTHS[variant.method.curve]:
+    for width in _EQUIVALENCE_WIDTHS.get(_kind(variant.method), (WIDTH,)):
         if finding := _prove(equivalence(variant.device(width), variant.golden(width))):
             return f"width {width}: {finding}"
     return ""
@@ -321,7 +553,7 @@ def equivalence_by_proof(variant: Variant) -> str:
 def promises(variant: Variant) -> str:
     """Prove the promises of the device itself, in place of its golden model."""
     device = _Device(variant)
-    proofs = import_module(f"discreta.sim.proofs.{variant.method.name}")
+    proofs = variant.method.proof_module()
     # What the variants of a method have in common, if anything, is the shorter part.
     for promised in (getattr(proofs, "shared", None), proofs.promises):
         obligations = promised(device.golden) if promised else []
@@ -448,7 +680,8 @@ def compiled(variant: Variant) -> str:
         variant.method, name=variant.name, device=lambda width, **_: variant.device(width)
     )
     # Some curves of each kind tell as much here as thousands.
-    with patch.object(survey_samples, "_CURVES", 1000):
+    few = {"_CURVES": 1000} | ({"SAMPLE_BUDGET": 1 << 18} if method.timed else {})
+    with patch.multiple(survey_samples, **few):
         groups = survey_groups(method, WIDTH)
     bound = method.bound(variant.golden(WIDTH))
     findings = []
@@ -483,10 +716,11 @@ def verilator(variant: Variant) -> str:
 
 def _foreign(variant: Variant, simulator: str) -> str:
     stalls = Stalls(seed=SEED + 1, stall=0.4, gap=0.3)
-    resets = (60, 150, 151)
+    kind = _kind(variant.method)
+    resets = _LATE_RESETS.get(kind, _RESETS)
     golden, top = variant.golden(WIDTH), PlainPorts(variant.device(WIDTH))
-    blocks = _BLOCKS[variant.method.curve]
-    _, expected = _expected(golden, variant.method.curve, stalls, resets)
+    blocks = _BLOCKS[kind]
+    _, expected = _expected(golden, kind, stalls, resets)
     names = list(golden.outputs(golden.reset()))
     text = verilog(top, "device")
     try:

@@ -347,3 +347,34 @@ def test_hundreds_of_conics_in_one_run(stalls):
         bend = off * steep - second * off**2 / 2 * (1 + 1e-9)
         np.testing.assert_array_less(bend[good], np.abs(value)[good] + 1e-6 * steep[good])
     assert judged > 0.8 * len(points)
+
+
+@pytest.mark.parametrize("cut", [None, 3])
+def test_a_block_without_a_last_step_ends_when_it_is_done(cut):
+    """On its end, if it is allowed to; a step that was the last one is believed."""
+    lines = np.array([[0, 0, 2, 1], [2, 1, 4, 1], [4, 1, 6, 1], [6, 1, 6, 1]])
+    # One that says nothing, one that does so a step too early, one that is not there yet.
+    moves = [[(1, 0, 0), (1, 1, 0)], [(1, 0, 1), (1, 0, 0)], [(1, 0, 0)], []]
+    rows = []
+    for block in moves:
+        rows += [[len(rows) + index, 0, 0, 0, 1, *move] for index, move in enumerate(block)]
+        rows.append([len(rows), 0, 1, 0, 0, 0, 0, 0])
+    for timed, reached in (
+        (False, [False, False, False, True]),
+        (True, [True, False, False, True]),
+    ):
+        contour = LineContour(np.pad(lines, ((0, 0), (0, 2)), constant_values=9), 2)
+        contour.done_ends = timed
+        for part in (rows[:cut], rows[len(rows) if cut is None else cut :]):
+            events = np.array(part, dtype=np.int64).reshape(-1, len(EVENT_COLUMNS) + 3)
+            contour.follow(Stretch(9, 0, 0, events, np.empty((0, 0))))
+        assert contour.reached.tolist() == reached
+
+
+def test_columns_behind_those_of_a_curve_are_its_timing():
+    lines = np.array([[0, 0, 3, 4, 7, 200], [3, 4, 3, 4, 1, 200]])
+    contour = LineContour(lines, 2)
+    assert (contour.starts.tolist(), contour.ends.tolist()) == ([[0, 0], [3, 4]], [[3, 4]] * 2)
+    assert contour.errors(np.array([[4, -3]]), np.array([0])).tolist() == [5]
+    arcs = np.array([[3, 4, 5, 0, 0, 0, 0, 0, 7, 200]])
+    assert ArcContour(arcs).errors(np.array([[0, 7]]), np.array([0])).tolist() == [2]

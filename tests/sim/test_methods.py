@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from amaranth.hdl import Fragment
 
+from discreta.sim.carrier import least_periods
 from discreta.sim.conics import KINDS, ellipse, random_blocks
 from discreta.sim.contour import ArcContour, ConicContour, LineContour
 from discreta.sim.methods import METHODS
@@ -44,8 +45,8 @@ def test_settings_give_every_choice_a_value_that_is_surveyed(method):
         assert all(value in method.choices[name] for name, value in setting.items())
     # What a device is without a word is the default setting.
     core, model = method.core(8), method.model(8)
-    for made in (core.parameters, vars(model)):
-        assert made == made | method.settings["default"]
+    assert core.parameters == core.parameters | method.settings["default"]
+    assert all(getattr(model, name) == value for name, value in method.settings["default"].items())
     Fragment.get(core, None)  # else Amaranth complains that it is not used
 
 
@@ -87,34 +88,87 @@ def blocks_of_conics(count, width):
     return np.concatenate([*drawn, around])
 
 
-CONTOURS = {"line": LineContour, "arc": ArcContour, "conic": ConicContour}
+CONTOURS = {
+    "line": lambda blocks: LineContour(blocks, 2),
+    "arc": ArcContour,
+    "conic": ConicContour,
+}
+BLOCKS = {
+    "line": blocks_of_lines(100, 6),
+    "arc": blocks_of_arcs(60, 6),
+    "conic": blocks_of_conics(150, 6),
+}
+
+
+def timed_blocks(method, golden, count):
+    """Give few and short blocks: a period takes a hundred clocks."""
+    blocks = BLOCKS[method.curve][:count].copy()
+    if method.curve == "arc":
+        blocks[:, 7] = 0
+        periods = least_periods(blocks, "plain")
+    else:
+        periods = 1 + np.abs(blocks[:, 2:] - blocks[:, :2]).max(axis=1) // 5
+    return np.column_stack([blocks, periods, np.full(count, golden.least_period + 7)])
 
 
 @pytest.mark.usefixtures("compiled_engine")
 @pytest.mark.parametrize("setting", ["default", "lecture"])
-@pytest.mark.parametrize(
-    ("name", "blocks"),
-    [
-        ("linear", blocks_of_lines(100, 6)),
-        ("comparison", blocks_of_lines(100, 6)),
-        ("circular", blocks_of_arcs(60, 6)),
-        ("conic", blocks_of_conics(150, 6)),
-    ],
-    ids=METHODS,
-)
-def test_no_block_takes_more_clocks_than_it_may(name, blocks, setting):
+@pytest.mark.parametrize("name", METHODS)
+def test_no_block_takes_more_clocks_than_it_may(name, setting):
     """And the limit is no more than a few times too high: a dead core is soon given up."""
     method = METHODS[name]
     choices = method.settings[setting]
-    most = method.clocks(method.model(6, **choices), blocks)
+    golden = method.model(6, **choices)
+    blocks = timed_blocks(method, golden, 8) if method.timed else BLOCKS[method.curve]
+    most = method.clocks(golden, blocks)
     contour = CONTOURS[method.curve](blocks)
+    contour.done_ends = method.timed
     core = method.core(6, **choices)
-    for stretch in simulate(core, blocks, limit=int(most.sum()) + 2, engine="compiled"):
+    # Of a large device so few clocks are sooner run than built.
+    engine = "pysim" if method.timed else "compiled"
+    for stretch in simulate(core, blocks, limit=int(most.sum()) + 2, engine=engine):
         contour.follow(stretch)
     # Back to back a block begins, at the earliest, with the last step of the one before.
     assert np.all(contour.block_clocks <= most)
     assert contour.block_clocks.sum() > most.sum() / 8
     assert contour.reached.all()
+
+
+def test_variants_that_make_the_same_machine_are_one():
+    """A coefficient is used by rotation alone."""
+    method = METHODS["carrier_circular"]
+    variants = method.variants()
+    assert len(variants) == (2 + 1 + 1) * 2
+    for formula, sources in (("rotation", 2), ("predictor_corrector", 1), ("plain", 1)):
+        found = {row["coefficient"] for row in variants if row["formula"] == formula}
+        assert len(found) == sources
+    registers = [
+        method.model(8, formula=formula, coefficient=coefficient).registers()
+        for formula, coefficient in (
+            ("plain", "series"),
+            ("plain", "table"),
+            ("rotation", "series"),
+        )
+    ]
+    assert registers[0] == registers[1] != registers[2]
+
+
+@pytest.mark.parametrize("preload", ["half", "zero"])
+def test_no_point_of_a_line_on_a_carrier_is_farther_than_the_bound(preload):
+    """By its own formula, with mean increments that are up to a whole 2^−f too small."""
+    method, width = METHODS["carrier_linear"], 8
+    golden = method.model(width, preload=preload)
+    bound = method.bound(golden)
+    random = np.random.default_rng(6)
+    worst = 0.0
+    for _ in range(300):
+        delta, periods = random.integers(0, 2**width, 2), random.integers(1, 400)
+        mean = (delta << golden.fraction_bits) // periods
+        passed = np.arange(1, periods)[:, None]
+        points = (golden.initial_fraction + passed * mean) >> golden.fraction_bits
+        off = np.abs(points[:, 0] * delta[1] - points[:, 1] * delta[0])
+        worst = max(worst, np.max(off, initial=0) / max(np.hypot(*delta), 1))
+    assert 0.85 * bound < worst <= bound
 
 
 def test_clocks_of_lines_are_the_power_of_two_above_the_longest_axis():

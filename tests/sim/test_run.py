@@ -1,5 +1,6 @@
 import csv
 import json
+from fractions import Fraction
 from math import hypot
 from pathlib import Path
 
@@ -159,6 +160,78 @@ def test_a_method_draws_its_own_curves_alone():
         run(Polyline(POINTS), CIRCULAR)
     with pytest.raises(BadInputError, match=r"^method linear draws lines and no arcs: choose circ"):
         run(ARC, LINEAR)
+
+
+def test_a_line_on_a_carrier(tmp_path):
+    """By the lecture: ⌊i·Δ/N⌋ after i periods of T clocks, and the end after the last one."""
+    trace = tmp_path / "t.csv"
+    line, speed, period = Polyline([(-3, 5), (30, -39)]), Fraction(1, 7), 30
+    method = METHODS["carrier_linear"]
+    options = {"speed": speed, "period": period, "preload": "zero"}
+    summary = run(line, method, width=6, engine="pysim", trace=str(trace), **options)
+    # 55 steps long.
+    periods = -(-55 * 7 // period)
+    means = [Fraction(delta * 2**18 // periods, 2**18) for delta in (33, 44)]
+    expected = [(int(i * means[0]) - 3, 5 - int(i * means[1])) for i in range(periods)]
+    rows = [[int(cell) for cell in row] for row in list(csv.reader(trace.open()))[1:]]
+    assert [tuple(point) for _, *point in rows] == [*expected, (30, -39)]
+    clocks = [clock for clock, *_ in rows]
+    assert set(np.diff(clocks[1:])) == {period}
+    largest = max(distance(point, (-3, 5), (30, -39)) for point in expected)
+    steps = sum(max(np.abs(np.diff(rows, axis=0)[i, 1:])) for i in range(periods))
+    assert summary == {
+        "method": "carrier_linear",
+        "width": 6,
+        "preload": "zero",
+        "engine": "pysim",
+        "clocks": clocks[-1],
+        "steps": steps,
+        "clocks per step": round(clocks[-1] / steps, 4),
+        "period": period,
+        "periods": periods,
+        "steps per period": round(55 / periods, 4),
+        "mean increments": [round(33 / periods, 4), round(-44 / periods, 4)],
+        "largest error": round(largest, 4),
+        "largest error at": summary["largest error at"],
+        "error bound": 1.0625,
+        "segments": 1,
+        "support points hit": 1,
+        "path closed": False,
+        "end point reached": True,
+    }
+
+
+@pytest.mark.parametrize("name", ["carrier_circular", "two_stage_circular"])
+def test_an_arc_on_a_carrier(name):
+    summary = run(ARC, METHODS[name], width=6, engine="pysim", period=110)
+    turn = np.radians(630)
+    periods = int(np.ceil(41 * turn / 11))
+    facts = {"period": 110, "periods": periods, "steps per period": round(41 * turn / periods, 4)}
+    facts |= {"mean angle": round(-turn / periods, 6), "turn": -630.0, "end point reached": True}
+    assert summary == summary | facts
+    assert 110 * (periods - 1) < summary["clocks"] < 110 * (periods + 9)
+
+
+def test_paths_on_a_carrier_say_what_their_lines_have_together():
+    summary = run(Polyline(POINTS), METHODS["two_stage_linear"], width=6, engine="pysim", period=50)
+    lengths = np.hypot(*np.diff(POINTS, axis=0).T)
+    periods = int(np.ceil(lengths / 5).sum())
+    assert (summary["periods"], summary["support points hit"]) == (periods, len(POINTS) - 1)
+    assert summary["steps per period"] == round(lengths.sum() / periods, 4)
+    assert not {"mean increments", "summations", "clocks lost between blocks"} & summary.keys()
+
+
+def test_a_timing_that_cannot_be_is_refused():
+    fast = {"speed": Fraction(1), "width": 8}
+    with pytest.raises(BadInputError, match=r"too few periods; lower --speed or --period$"):
+        run(ARC, METHODS["carrier_circular"], **fast)
+    with pytest.raises(BadInputError, match=r"^--period 101: the device takes 102 to 16777215 clo"):
+        run(ARC, METHODS["two_stage_circular"], period=101, **fast)
+    for given in ({"speed": Fraction(1)}, {"period": 9}):
+        with pytest.raises(BadInputError, match=r" is no option of circular, which has no carrier"):
+            run(ARC, CIRCULAR, **given)
+    with pytest.raises(BadInputError, match=r"^the line has 3 axes and method carrier_linear 2: c"):
+        run(Polyline([(0, 0, 0), (1, 2, 3)]), METHODS["carrier_linear"])
 
 
 def test_choices_in_words():
