@@ -78,13 +78,14 @@ class _Point(click.ParamType):
         return point
 
 
+#: A number of no more digits than any device can tell apart.
+_NUMBER = re.compile(
+    r"\s*[+-]?(\d{1,40}(\.\d{0,40})?(e[+-]?\d{1,2})?|\d{1,40}/0*[1-9]\d{0,40})\s*", re.ASCII
+)
+
+
 class _Numbers(click.ParamType):
     """Numbers: whole ones, decimals or fractions."""
-
-    #: Of no more digits than any device can tell apart.
-    _FORM = re.compile(
-        r"\s*[+-]?(\d{1,40}(\.\d{0,40})?(e[+-]?\d{1,2})?|\d{1,40}/0*[1-9]\d{0,40})\s*", re.ASCII
-    )
 
     def __init__(self, name: str, like: str):
         self.name = name
@@ -93,7 +94,7 @@ class _Numbers(click.ParamType):
     def convert(self, value: Any, param: Any, ctx: Any) -> tuple[Fraction, ...]:
         cells = value.split(",")
         count = self._like.count(",") + 1
-        if len(cells) != count or not all(map(self._FORM.fullmatch, cells)):
+        if len(cells) != count or not all(map(_NUMBER.fullmatch, cells)):
             self.fail(
                 f"{value!r} is not {self.name}: give {count} numbers with commas between, like "
                 f"{self._like}",
@@ -103,14 +104,15 @@ class _Numbers(click.ParamType):
         return tuple(Fraction(cell) for cell in cells)
 
 
-class _Speed(_Numbers):
-    """One number more than 0."""
+class _Speed(click.ParamType):
+    """A speed: a number more than 0, a whole one, a decimal or a fraction."""
 
-    def __init__(self):
-        super().__init__("a speed", "0.1")
+    name = "F"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        (speed,) = super().convert(value, param, ctx)
+    def convert(self, value: Any, param: Any, ctx: Any) -> Fraction:
+        if not _NUMBER.fullmatch(value):
+            self.fail(f"{value!r} is not a speed: give a number like 0.1 or 1/10", param, ctx)
+        speed = Fraction(value)
         if speed <= 0:
             self.fail(f"{value} steps per clock are no speed: choose more than 0", param, ctx)
         return speed
@@ -735,7 +737,8 @@ def survey_command(method: Method, width: int, setting: str | None, whole_degree
 
     Lines: of all lengths. Arcs: all quarter arcs and circles about the origin, some circles ten
     times round, and a sample of any arcs. Conics: 20,000 of every kind, and some ellipses ten times
-    round. The column 99.9 % has the error that so many of the blocks do not exceed. Clocks are
+    round. On a carrier: a sample of them all with a sample of timings, and some whose timing is to
+    be refused. The column 99.9 % has the error that so many of the blocks do not exceed. Clocks are
     those in which the device sums, per step of the axis that moves faster. Runs on the compiled
     engine. Exits 1 when a register differs from the golden model or an end is missed.
 

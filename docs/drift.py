@@ -6,6 +6,7 @@ point that a true circle has at that period: off the circle, and along it.
 
 from itertools import product
 from math import hypot, pi
+from typing import Any
 
 import numpy as np
 from rich.box import MARKDOWN
@@ -45,7 +46,7 @@ def theory(formula: str, angle: float, turned: np.ndarray) -> tuple[np.ndarray, 
 def drift(formula: str, coefficient: str, periods: int, turns: int) -> list[str]:
     """Run turns of the circle; give the cells of a table's row."""
     method = METHODS["carrier_circular"]
-    choices = {"formula": formula, "coefficient": coefficient, "preload": "half"}
+    choices: dict[str, Any] = {"formula": formula, "coefficient": coefficient, "preload": "half"}
     core = method.core(WIDTH, **choices)
     period = core.least_period
     block = [RADIUS, 0, RADIUS, 0, 0, 0, 0, turns - 1, periods * turns, period]

@@ -28,7 +28,8 @@ from discreta.hdl.parts.divider import Divider
 
 __all__ = ["FORMULAS", "MAX_WIDTH", "CarrierCircular"]
 
-#: Devices of more bits would have registers of more than 64.
+#: At 16 bits the quotient of the angle has 67 bits and all other registers up to 59: wider devices
+#: would be beyond what the engines watch.
 MAX_WIDTH = 16
 
 FORMULAS = ("rotation", "predictor_corrector", "plain")
@@ -67,10 +68,9 @@ class CarrierCircular(Part):
     :class:`~discreta.hdl.parts.divider.Divider` and
     :class:`~discreta.hdl.parts.coefficient_unit.CoefficientUnit`.
 
-    Latency: with b = 3n + 8 bits of Δφ, a block accepted in clock 0 is started in clock 4n + 2b +
-    32 (17·b + 4n + 66 or so with rotation: 15 products of its series; see :attr:`preparation`); its
-    first increments wait after 1, 2 or 3 (plain, predictor_corrector, rotation) times b + 1 clocks
-    more.
+    Latency: with b = 3n + 8 bits of Δφ, a block accepted in clock 0 is started in clock 4n + b +
+    31, with rotation in clock 4n + 16b + 63 (series) or 4n + 6b + 43 (table); its first increments
+    wait 2 clocks and 1, 2 or 3 (plain, predictor_corrector, rotation) times b + 1 later.
 
     Throughput: one result every T clocks, within a block and from block to block, if the next block
     is prepared by then, for T of at least b + 4 (plain), 2b + 5 (predictor_corrector) or 3b + 6
@@ -92,8 +92,9 @@ class CarrierCircular(Part):
 
     Error bound: the points put out are off the arc of radius R after the angle φ by no more than
     what the formula drifts, about R·φ·Δφ/2 (plain), R·φ·Δφ³/8 (predictor_corrector) or nothing
-    (rotation) along the radius, and a step for the whole parts; see docs/carrier_circular.md. The
-    last increment makes up for the drift; the end point is exact.
+    (rotation) along the radius, and √½ step (preload ½) or less than √2 (0) for the whole parts;
+    see docs/carrier_circular.md. The last increment makes up for the drift: it differs from R·Δφ by
+    no more than the formula's whole distance from the arc's end and 2 steps. The end is exact.
 
     Source: Ukrainian lecture, circular interpolation by digital differential analysers and its
     figure 6.27, with the formulas that the text has lost read as in design.md, 6.6. The
@@ -189,7 +190,7 @@ class CarrierCircular(Part):
         self.dividing = 2 * self.second
         self.divided = self.dividing + len(self.divider.quotient) + 1
         self.prepared = self.divided + 2 * rotation
-        self.preparation = 2 * n + 6 + self.prepared
+        self.preparation = 2 * n + 5 + self.prepared
         if self.unit is not None:
             self.preparation += len(self.unit.program) * (bits + 2)
         self.stage = Signal(range(self.prepared + 1))
@@ -400,8 +401,7 @@ class CarrierCircular(Part):
             bad.eq(
                 (self.next_periods == 0)
                 | (self.next_period < least)
-                | divider.quotient[bits - 1 :].any()
-                | few
+                | (~inp.empty & (divider.quotient[bits - 1 :].any() | few))
             ),
         ]
         return bad
@@ -423,7 +423,8 @@ class CarrierCircular(Part):
         uu, inp, bits = self.uu, self.input, factor_bits(self.width)
         angle = self.divider.quotient[:bits]
         start = {
-            a: (inp.start_registers[a] - inp.center_registers[a]) << self.fraction_bits for a in "xy"
+            a: (inp.start_registers[a] - inp.center_registers[a]) << self.fraction_bits
+            for a in "xy"
         }
         bit = self.factor[0]
         across, along = self.product["y"], self.product["x"]

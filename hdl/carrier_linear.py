@@ -27,14 +27,14 @@ MAX_WIDTH = 24
 class CarrierLinear(Part):
     """Draws a straight line in equal parts, one every carrier period.
 
-    Computes, for every axis, with Δ = \\|end − start\\|, N = ``periods``, f = n + 12 bits of fraction
-    and the mean increment m = ⌊Δ·2^f / N⌋ / 2^f, in every period::
+    Computes, for every axis, with Δ = \\|end − start\\|, N = ``periods``, f = n + 12 bits of
+    fraction and the mean increment m = ⌊Δ·2^f / N⌋ / 2^f, in every period::
 
         full := m + S; put out ⌊full⌋ steps; S := full − ⌊full⌋
 
     The fraction S starts from the preload, 0 or ½: after i periods ⌊S₀ + i·m⌋ steps are put out. In
     period N what is left to the end point is put out. A block also ends with the period that brings
-    it to its end point, which with preload ½ may be one before the N-th when m < ½ on both axes.
+    it to its end point, which with preload ½ is one before the N-th when m < ½ on both axes.
 
     Registers: P1, P2 = mean increments, n + f bits; P3, P4 = coordinates now; P5, P6 = steps left;
     SX, SY = fractions kept; ``periods`` = periods left; ``period`` = T; ``timer`` = clocks until

@@ -1,3 +1,5 @@
+# amaranth: UnusedElaboratable=no
+# (A first stage that is refused is not used.)
 """Two-stage interpolation: whole increments of a constant carrier, spread over their period."""
 
 from amaranth import Cat, Module, Mux, Signal

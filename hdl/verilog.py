@@ -139,6 +139,10 @@ def verilog(core: Part, name: str) -> str:
     text = yosys.run(
         ["-q", "-"], f"read_rtlil <<rtlil\n{design}\nrtlil\n{_PASSES}write_verilog -noattr\n"
     )
+    # Bits of a branch that no register takes over are X; this Yosys has no `setundef`.
+    text = re.sub(
+        r"(?<=\d)'[bh][\da-fx]*x[\da-fx]*", lambda match: match[0].replace("x", "0"), text
+    )
     if f"module \\{name} " in text:
         raise ValueError(f"name of the module is {name!r}, a keyword: choose another")
     _, first, *others = re.split(r"^(?=module )", _plain_names(text, name), flags=re.MULTILINE)

@@ -197,7 +197,8 @@ def _timed_group(
         enough = np.ones(len(blocks), dtype=np.int64)
     else:
         far, enough = lengths("arc", blocks), least_periods(blocks, "plain")
-    steps = np.exp(random.uniform(*np.log(_PERIOD_STEPS[kind]), len(blocks)))
+    low, high = _PERIOD_STEPS[kind]
+    steps = np.exp(random.uniform(np.log(low), np.log(high), len(blocks)))
     periods = np.maximum(np.ceil(far / steps).astype(np.int64), enough)
     period = random.integers(least, least + _PERIOD_CLOCKS, len(blocks), endpoint=True)
     blocks = np.column_stack([blocks, periods, period])

@@ -20,8 +20,8 @@ from discreta.hdl.conic import ORDERS as CONIC_ORDERS
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import MAX_WIDTH, Part
 from discreta.hdl.linear import Linear
-from discreta.hdl.two_stage import two_stage_circular, two_stage_linear
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
+from discreta.hdl.two_stage import two_stage_circular, two_stage_linear
 from discreta.sim.conics import motion
 from discreta.sim.golden.carrier_circular import CarrierCircular as GoldenCarrierCircular
 from discreta.sim.golden.carrier_linear import CarrierLinear as GoldenCarrierLinear
@@ -203,7 +203,7 @@ def _conic_clocks(golden: GoldenConic, blocks: np.ndarray) -> np.ndarray:
 _AROUND = 8
 
 
-def _carrier_linear_clocks(golden: GoldenCarrierLinear, blocks: np.ndarray) -> np.ndarray:
+def _carrier_linear_clocks(golden: Any, blocks: np.ndarray) -> np.ndarray:
     """N·T, the preparation, and what stands around them; a refused block may have any N and T."""
     return blocks[:, -2] * blocks[:, -1] + 2 * golden.width + 14 + _AROUND
 
@@ -213,7 +213,7 @@ def _carrier_linear_bound(golden: GoldenCarrierLinear) -> float:
     return math.sqrt(2) * 9 / 16 if golden.preload == "half" else 17 / 16
 
 
-def _carrier_circular_clocks(golden: GoldenCarrierCircular, blocks: np.ndarray) -> np.ndarray:
+def _carrier_circular_clocks(golden: Any, blocks: np.ndarray) -> np.ndarray:
     """N·T, the preparation, the products of the first period, and what stands around them."""
     preparation = 2 * golden.width + 6 + golden.prepared
     if golden.formula == "rotation":

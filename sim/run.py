@@ -221,7 +221,7 @@ def _timing_facts(curve: Curve, blocks: np.ndarray, width: int) -> dict[str, Any
     if curve.kind == "line":
         means = mean_increments(curve.blocks[0], periods[0], width)
         return facts | {"mean increments": [round(float(mean), 4) for mean in means]}
-    return facts | {"mean angle": round(float(mean_angle(curve.blocks[0], *periods, width)), 6)}
+    return facts | {"mean angle": round(float(mean_angle(curve.blocks[0], periods[0], width)), 6)}
 
 
 def say_choices(choices: dict[str, Any]) -> str:

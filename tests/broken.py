@@ -10,19 +10,25 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from amaranth import Cat, Module, Mux, Signal
+from amaranth import Cat, Const, Module, Mux, Signal
 from amaranth.hdl import Value
 
+from discreta.hdl.carrier_circular import CarrierCircular
+from discreta.hdl.carrier_linear import CarrierLinear
 from discreta.hdl.circular import Circular
 from discreta.hdl.comparison import Comparison
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import ErrorCode, Part
 from discreta.hdl.linear import Linear
+from discreta.hdl.two_stage import TwoStage
+from discreta.sim.golden.carrier_circular import CarrierCircular as GoldenCarrierCircular
+from discreta.sim.golden.carrier_linear import CarrierLinear as GoldenCarrierLinear
 from discreta.sim.golden.circular import Circular as GoldenCircular
 from discreta.sim.golden.comparison import Comparison as GoldenComparison
 from discreta.sim.golden.conic import Conic as GoldenConic
 from discreta.sim.golden.linear import Linear as GoldenLinear
 from discreta.sim.golden.logic import equal, where
+from discreta.sim.golden.two_stage import TwoStage as GoldenTwoStage
 from discreta.sim.methods import METHODS, Method
 
 __all__ = ["SOUND", "VARIANTS", "Variant"]
@@ -37,6 +43,9 @@ DOCUMENTS, SIMULATION, EQUIVALENCE, PROMISES, COMPILED, ICARUS, VERILATOR = ALL 
     "Verilator",
 )
 VERILOG = {ICARUS, VERILATOR}
+
+#: The rungs that compare registers with the golden model.
+REGISTERS = {SIMULATION, EQUIVALENCE, COMPILED}
 
 
 @dataclass(frozen=True)
@@ -76,7 +85,9 @@ class Variant:
 
 
 #: Arcs on a carrier by the formula that is quickest to prepare and to run.
-PLAIN = {"formula": "plain", "coefficient": "series", "preload": "half"}
+PLAIN: dict[str, Any] = {"formula": "plain", "coefficient": "series", "preload": "half"}
+#: The same with a corrector.
+CORRECTED: dict[str, Any] = PLAIN | {"formula": "predictor_corrector"}
 
 SOUND = [
     Variant(METHODS["linear"], "sound line", "nothing: normalized, preload half"),
@@ -157,6 +168,9 @@ def _variant(
 _line, _arc = partial(_variant, "linear"), partial(_variant, "circular")
 _conic = partial(_variant, "conic")
 _comparison = partial(_variant, "comparison")
+_carrier_line = partial(_variant, "carrier_linear")
+_carrier_arc = partial(_variant, "carrier_circular", **PLAIN)
+_two_stage = partial(_variant, "two_stage_linear")
 
 
 def _amend(part: Part, change: Callable[[Module], None]) -> None:
@@ -841,3 +855,476 @@ class _FirstMisread(GoldenComparison):
 def first_misread(core: Comparison) -> None:
     """Device and golden model both start with y at 45°, though it is x that was asked for."""
     core.first = "y"
+
+
+# Lines on a carrier. Broken sums, ends and timers.
+
+
+@_carrier_line({*ALL})
+def fraction_forgotten(core: CarrierLinear) -> None:
+    """What is left of a period's increment of x is lost, and the preload is there again."""
+
+    def change(m: Module) -> None:
+        with m.If(core.output.put):
+            m.d.sync += core.fraction["x"].eq(core.preloaded)
+
+    _amend(core, change)
+
+
+@_carrier_line({*ALL})
+def mean_rounded_up(core: CarrierLinear) -> None:
+    """A mean increment that has more bits than its register is rounded up."""
+
+    def change(m: Module) -> None:
+        with m.If(core.uu.load):
+            for a, divider in core.divider.items():
+                m.d.sync += core.mean[a].eq(divider.quotient + (divider.rest != 0))
+
+    _amend(core, change)
+
+
+@_carrier_line({*ALL}, **METHODS["carrier_linear"].settings["lecture"])
+def last_period_like_the_others(core: CarrierLinear) -> None:
+    """The last period puts out the mean of x and its fraction, whatever is left."""
+    full = core.mean["x"] + core.fraction["x"]
+    whole = full[core.fraction_bits :]
+    _assign(core, core.output.increment["x"], Mux(core.direction["x"], -whole, whole))
+
+
+@_carrier_line({*ALL})
+def timer_one_short(core: CarrierLinear) -> None:
+    """A carrier period is over a clock too soon."""
+    _assign(core, core.output.period, core.period - 1)
+
+
+@_carrier_line({*ALL})
+def period_of_the_prepared_block(core: CarrierLinear) -> None:
+    """The timer is set to the period of the block that was accepted last."""
+    _assign(core, core.output.period, core.next_period)
+
+
+@_carrier_line({*ALL})
+def carrier_preload_forgotten(core: CarrierLinear) -> None:
+    """A block goes on with the fraction of x that the one before left."""
+
+    def change(m: Module) -> None:
+        with m.If(core.uu.load):
+            m.d.sync += core.fraction["x"].eq(core.fraction["x"])
+
+    _amend(core, change)
+
+
+@_carrier_line({*ALL})
+def carrier_answer_lost(core: CarrierLinear) -> None:
+    """An empty block starts while the last increments before it are taken: one answer for two."""
+    uu = core.uu
+    _assign(uu, uu.start, uu.pending & ~uu.running & (~uu.waiting | uu.ready))
+
+
+# The increments are right, the coordinates are not.
+@_carrier_line({*ALL} - {DOCUMENTS})
+def increments_placed_too_soon(core: CarrierLinear) -> None:
+    """P3 counts when increments begin to wait, not when they are taken."""
+    out = core.output
+
+    def change(m: Module) -> None:
+        with m.If(out.load):
+            m.d.sync += out.place["x"].eq(out.start.x)
+        with m.Elif(out.put):
+            m.d.sync += out.place["x"].eq(out.place["x"] + out.increment.x)
+        with m.Else():
+            m.d.sync += out.place["x"].eq(out.place["x"])
+
+    _amend(out, change)
+
+
+# Only with the right stimuli.
+
+
+@_carrier_line({*ALL} - {DOCUMENTS, COMPILED})
+def timer_runs_while_increments_wait(core: CarrierLinear) -> None:
+    """The carrier period goes on though increments wait and are not taken."""
+    out = core.output
+
+    def change(m: Module) -> None:
+        with m.If(~out.put & ~out.due):
+            m.d.sync += out.timer.eq(out.timer - 1)
+
+    _amend(out, change)
+
+
+@_carrier_line({*ALL} - {DOCUMENTS})
+def timing_not_refused(core: CarrierLinear) -> None:
+    """A block with no periods, or with a period too short, is run."""
+    _assign(core, core.uu.fault, core.input.fault)
+
+
+@_carrier_line({EQUIVALENCE} | VERILOG)
+def waiting_increments_not_reset(core: CarrierLinear) -> None:
+    """Increments that wait survive a reset, and are taken after it."""
+    out = core.output
+    fresh = Signal.like(out.waiting_register, name="waiting", reset_less=True)
+    core.registers["waiting"] = out.waiting_register = fresh
+
+
+# Equal to its golden model, and wrong: what the division gives, a proof of a clock cannot tell.
+
+
+class _MeanMisread(GoldenCarrierLinear):
+    """The mistake of :func:`mean_misread`, made a second time."""
+
+    def step(self, state, inputs, busy_behind=0):
+        after = super().step(state, inputs, busy_behind)
+        half = where(equal(state["tick"], 1), state["next_periods"] >> 1, 0)
+        return after | {f"quotient_{a}": after[f"quotient_{a}"] + half for a in "xy"}
+
+
+@_carrier_line({DOCUMENTS}, golden=_MeanMisread)
+def mean_misread(core: CarrierLinear) -> None:
+    """Device and golden model both round the mean increments to the nearest number there is."""
+    for a, divider in core.divider.items():
+        dividend = (core.input.delta[a] << core.fraction_bits) + (core.next_periods >> 1)
+        _assign(core, divider.dividend, dividend)
+
+
+# Lines in two stages.
+
+
+def _taken(core: TwoStage) -> Value:
+    """Tell the clock in which the second stage takes a period's increments."""
+    return core.coarse.steps.valid & core.coarse.steps.ready
+
+
+def _summed(core: TwoStage) -> Value:
+    """Tell a clock of the second stage."""
+    return core.running & (~Cat(core.step["x"], core.step["y"]).any() | core.steps.ready)
+
+
+def _sum_of_x(core: TwoStage, span: Value, *, equal_carries: bool = True) -> None:
+    """Have SX carry at this modulus, in place of its own."""
+
+    def change(m: Module) -> None:
+        total = core.sum["x"] + core.increment["x"]
+        carry = total >= span if equal_carries else total > span
+        with m.If(_summed(core)):
+            m.d.sync += core.step["x"].eq(Cat(carry, carry & core.direction["x"]))
+            with m.If(~_taken(core)):
+                m.d.sync += core.sum["x"].eq(Mux(carry, total - span, total))
+                m.d.sync += core.left["x"].eq(core.left["x"] - carry)
+
+    _amend(core, change)
+
+
+@_two_stage({*ALL})
+def carry_one_too_late(core: TwoStage) -> None:
+    """SX carries when it is more than the modulus, not when it comes to it."""
+    _sum_of_x(core, core.span, equal_carries=False)
+
+
+@_two_stage({*ALL})
+def modulus_fixed(core: TwoStage) -> None:
+    """SX has a modulus of its bits, as the linear interpolator, and not the period's clocks."""
+    _sum_of_x(core, Const(1 << core.width))
+
+
+@_two_stage({*ALL})
+def period_never_longer(core: TwoStage) -> None:
+    """A period lasts T clocks, though it has more steps than that."""
+
+    def change(m: Module) -> None:
+        with m.If(_taken(core)):
+            m.d.sync += [core.span.eq(core.coarse.period), core.clocks_left.eq(core.coarse.period)]
+
+    _amend(core, change)
+
+
+@_two_stage({*ALL})
+def second_preload_forgotten(core: TwoStage) -> None:
+    """SX of the second stage starts a period from 0, though the preload is half."""
+
+    def change(m: Module) -> None:
+        with m.If(_taken(core)):
+            m.d.sync += core.sum["x"].eq(0)
+
+    _amend(core, change)
+
+
+@_two_stage({*ALL}, **METHODS["two_stage_linear"].settings["lecture"])
+def direction_of_the_next_period(core: TwoStage) -> None:
+    """The sign of a step is that of the increments that wait, not of those that are summed."""
+
+    def change(m: Module) -> None:
+        carry = core.sum["x"] + core.increment["x"] >= core.span
+        with m.If(_summed(core)):
+            m.d.sync += core.step["x"].eq(Cat(carry, carry & (core.coarse.steps.payload.x < 0)))
+
+    _amend(core, change)
+
+
+@_two_stage({*ALL})
+def last_flag_lost(core: TwoStage) -> None:
+    """No step is marked as the last one of its block."""
+
+    def change(m: Module) -> None:
+        m.d.sync += core.step_last.eq(0)
+
+    _amend(core, change)
+
+
+@_two_stage({*ALL} - {DOCUMENTS})
+def next_start_placed_too_soon(core: TwoStage) -> None:
+    """XT is loaded when the first stage starts a block, while steps of the one before are left."""
+    coarse = core.coarse
+
+    def change(m: Module) -> None:
+        with m.If(coarse.output.load):
+            m.d.sync += core.place["x"].eq(coarse.output.start.x)
+
+    _amend(core, change)
+
+
+@_two_stage({*ALL} - {DOCUMENTS})
+def answer_overtakes(core: TwoStage) -> None:
+    """A block of no length or a refused one is answered while steps before it are left."""
+    _assign(core, core.coarse.busy_behind, 0)
+
+
+@_two_stage({*ALL} - {DOCUMENTS, COMPILED})
+def second_stage_does_not_wait(core: TwoStage) -> None:
+    """A step that is not taken is forgotten, and the next one is computed."""
+
+    def change(m: Module) -> None:
+        with m.If(core.running & ~_summed(core) & (core.clocks_left != 1)):
+            m.d.sync += core.clocks_left.eq(core.clocks_left - 1)
+            for a in "xy":
+                total = core.sum[a] + core.increment[a]
+                carry = total >= core.span
+                m.d.sync += [
+                    core.sum[a].eq(Mux(carry, total - core.span, total)),
+                    core.left[a].eq(core.left[a] - carry),
+                    core.step[a].eq(Cat(carry, carry & core.direction[a])),
+                ]
+
+    _amend(core, change)
+
+
+@_two_stage({EQUIVALENCE} | VERILOG)
+def open_block_not_reset(core: TwoStage) -> None:
+    """That a block is not answered yet survives a reset."""
+    fresh = Signal.like(core.open, name="open", reset_less=True)
+    core.registers["open"] = core.open = fresh
+
+
+# Equal to its golden model, and wrong: the promises of the second stage take the first as it comes.
+
+
+class _CarrierAxisMisread(GoldenCarrierLinear):
+    """The mistake of :func:`carrier_axis_misread`, made a second time."""
+
+    def step(self, state, inputs, busy_behind=0):
+        after = super().step(state, inputs, busy_behind)
+        accept = inputs["blocks_valid"] & self.outputs(state, busy_behind)["blocks_ready"]
+        return after | {"negative_y": after["negative_y"] ^ accept}
+
+
+def _two_stage_axis_misread(width: int, preload: str = "half") -> GoldenTwoStage:
+    return GoldenTwoStage(_CarrierAxisMisread(width, preload))
+
+
+@_two_stage({DOCUMENTS, COMPILED}, golden=_two_stage_axis_misread)
+def carrier_axis_misread(core: TwoStage) -> None:
+    """Device and golden model both take y to grow downwards in the first stage."""
+    inp = core.coarse.input
+
+    def change(m: Module) -> None:
+        with m.If(inp.blocks.valid & inp.blocks.ready):
+            block = inp.blocks.payload
+            m.d.sync += inp.negative_registers["y"].eq(block.end.y >= block.start.y)
+
+    _amend(inp, change)
+
+
+# Arcs on a carrier. Broken products, angles and ends.
+
+
+def _finished(core: CarrierCircular) -> Value:
+    """Tell the clock in which a product is used."""
+    return core.uu.clock & ~core.computed & (core.digit == 0)
+
+
+@_carrier_arc({*ALL} - {PROMISES})
+def sign_of_a_product(core: CarrierCircular) -> None:
+    """x grows by y times the angle instead of falling, whichever way the arc runs."""
+
+    def change(m: Module) -> None:
+        with m.If(_finished(core)):
+            added = Mux(core.clockwise, -core.product["y"], core.product["y"])
+            m.d.sync += core.place["x"].eq(core.place["x"] + added)
+
+    _amend(core, change)
+
+
+@_carrier_arc({*ALL} - {PROMISES})
+def new_x_used_for_y(core: CarrierCircular) -> None:
+    """y grows by the new x times the angle, not by that of the period before."""
+
+    def change(m: Module) -> None:
+        across = Mux(core.clockwise, core.product["y"], -core.product["y"])
+        along = ((core.place["x"] + across) * core.factor) >> len(core.factor)
+        with m.If(_finished(core)):
+            m.d.sync += core.place["y"].eq(core.place["y"] + Mux(core.clockwise, -along, along))
+
+    _amend(core, change)
+
+
+@_carrier_arc({*ALL} - {PROMISES})
+def factor_not_coming_round(core: CarrierCircular) -> None:
+    """The angle is shifted out of its register: from the second period on it is 0."""
+
+    def change(m: Module) -> None:
+        with m.If(core.uu.clock & ~core.computed & (core.digit != 0)):
+            m.d.sync += core.factor.eq(core.factor >> 1)
+
+    _amend(core, change)
+
+
+@_carrier_arc(REGISTERS)
+def product_not_cleared(core: CarrierCircular) -> None:
+    """The product of x begins with what the one before came to."""
+
+    def change(m: Module) -> None:
+        with m.If(_finished(core) | core.output.put):
+            m.d.sync += core.product["x"].eq(core.product["x"])
+
+    _amend(core, change)
+
+
+@_carrier_arc({*ALL} - {PROMISES})
+def half_turn_lost(core: CarrierCircular) -> None:
+    """The angle of an arc that crosses two axes is measured a half turn short."""
+    _assign(core, core.angle.turns, core.input.first_turns & ~2)
+
+
+@_carrier_arc(REGISTERS)
+def angle_one_turning_short(core: CarrierCircular) -> None:
+    """The last turning that measures an angle is left out."""
+    last = core.angle.index == core.width + 5
+    _assign(core, core.angle.turn, (core.stage < core.dividing) & ~last)
+
+
+@_carrier_arc({*ALL})
+def end_of_the_prepared_block(core: CarrierCircular) -> None:
+    """The last period leads to the end of the block that was accepted last."""
+    out = core.output
+
+    def change(m: Module) -> None:
+        with m.If(core.periods == 1):
+            m.d.comb += [out.increment[a].eq(core.next_end[a] - out.reached[a]) for a in "xy"]
+
+    _amend(core, change)
+
+
+@_carrier_arc({*ALL})
+def clamp_missing(core: CarrierCircular) -> None:
+    """An arc may be led out of the coordinates there are."""
+    out, half = core.output, 1 << (core.fraction_bits - 1)
+
+    def change(m: Module) -> None:
+        with m.If(core.periods != 1):
+            for a in "xy":
+                whole = ((core.place[a] + half) >> core.fraction_bits) + core.center[a]
+                m.d.comb += out.increment[a].eq(whole - out.reached[a])
+
+    _amend(core, change)
+
+
+@_carrier_arc({*ALL} - {PROMISES})
+def early_end_missed(core: CarrierCircular) -> None:
+    """The last period comes though the one before has led to the end."""
+    _assign(core, core.uu.ending, core.computed & core.output.due & (core.periods == 1))
+
+
+@_carrier_arc({*ALL})
+def arc_timer_one_long(core: CarrierCircular) -> None:
+    """A carrier period takes a clock more than it should."""
+    _assign(core, core.output.period, core.period + 1)
+
+
+@_carrier_arc({*ALL})
+def fraction_not_kept(core: CarrierCircular) -> None:
+    """What is put out of x is taken off its fraction too."""
+
+    def change(m: Module) -> None:
+        with m.If(core.output.put):
+            whole = (core.place["x"] >> core.fraction_bits) << core.fraction_bits
+            m.d.sync += core.place["x"].eq(whole)
+
+    _amend(core, change)
+
+
+@_variant("carrier_circular", {*ALL} - {PROMISES}, **CORRECTED)
+def predicted_for_the_mean(core: CarrierCircular) -> None:
+    """The correction is made with the predicted x alone, not with its mean with the old one."""
+
+    def change(m: Module) -> None:
+        with m.If(_finished(core) & (core.round == 0)):
+            turned = Mux(core.clockwise, core.product["y"], -core.product["y"])
+            m.d.sync += core.mean["x"].eq(core.place["x"] + turned)
+
+    _amend(core, change)
+
+
+@_variant("carrier_circular", REGISTERS)
+def series_cut(core: CarrierCircular) -> None:
+    """The series of κ is cut after its first term: κ = Δφ²."""
+    unit = core.unit
+    assert unit is not None
+    first = next(i for i, (_, _, to) in enumerate(unit.program) if to is unit.kappa)
+    unit.program[first - 1] = (unit.scaled, 0, unit.term)
+
+
+# Only with the right stimuli.
+
+
+@_carrier_arc({*ALL} - {DOCUMENTS})
+def arc_timing_not_refused(core: CarrierCircular) -> None:
+    """An arc is run whatever its number of periods and their length."""
+    _assign(core, core.uu.fault, core.input.fault)
+
+
+@_carrier_arc({*ALL} - {DOCUMENTS, COMPILED})
+def increments_lost_under_stall(core: CarrierCircular) -> None:
+    """Increments that are not taken are forgotten, and the next ones are put out."""
+    _assign(core, core.uu.ready, 1)
+
+
+@_carrier_arc({EQUIVALENCE} | VERILOG)
+def arc_preparation_not_reset(core: CarrierCircular) -> None:
+    """A block that is being prepared survives a reset, with what was prepared of it lost."""
+    inp = core.input
+    fresh = Signal.like(inp.held_register, name="held", reset_less=True)
+    core.registers["held"] = inp.held_register = fresh
+
+
+# Equal to its golden model, and wrong.
+
+
+class _TurningMisread(GoldenCarrierCircular):
+    """The mistake of :func:`turning_misread`, made a second time."""
+
+    def step(self, state, inputs, busy_behind=0):
+        misread = inputs | {"blocks_clockwise": inputs["blocks_clockwise"] ^ 1}
+        return super().step(state, misread, busy_behind)
+
+
+@_carrier_arc({DOCUMENTS, COMPILED}, golden=_TurningMisread)
+def turning_misread(core: CarrierCircular) -> None:
+    """Device and golden model both take clockwise for counter-clockwise."""
+    clockwise = ~core.blocks.payload.clockwise
+
+    def change(m: Module) -> None:
+        m.d.comb += core.input.blocks.payload.clockwise.eq(clockwise)
+        with m.If(core.blocks.valid & core.blocks.ready):
+            m.d.sync += core.next_clockwise.eq(clockwise)
+
+    _amend(core, change)

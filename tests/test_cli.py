@@ -611,6 +611,28 @@ def test_verilog_of_a_setting(discreta, words, core):
     assert re.findall(r"^module (\w+)", out, re.MULTILINE)[0] == f"discreta_{words[0]}"
 
 
+def test_on_a_carrier(discreta, folder):
+    """A number as a decimal or a fraction, and the picture has a panel more."""
+    timing = ["--period", "50", "--trace", "-", *PYSIM, "--width", "6", "--plot", "p.svg"]
+    traces = set()
+    for speed in ("0.125", "1/8", "125e-3"):
+        code, out, _ = discreta(*LINE, "--method", "carrier_linear", "--speed", speed, *timing)
+        assert code == 0
+        traces.add(out)
+    ((_, *rows),) = (read_trace(trace)[1] for trace in traces)
+    # 21.93 steps, 6.25 a period.
+    assert len(rows) == 4
+    assert rows[-1][1] == (20, 9)
+    assert "steps per period" in (folder / "p.svg").read_text()
+    # The same points, step by step.
+    code, out, _ = discreta(*LINE, "--method", "two_stage_linear", "--speed", "1/8", *timing)
+    steps = [point for _, point in read_trace(out)[1]]
+    assert code == 0
+    assert len(steps) > 20
+    assert {point for _, point in rows} <= set(steps)
+    assert "steps per period" not in (folder / "p.svg").read_text()
+
+
 def test_methods(discreta):
     code, out, err = discreta("methods")
     assert (code, err) == (0, "")
@@ -624,6 +646,27 @@ def test_methods(discreta):
 
 def test_version(discreta):
     assert discreta("--version") == (0, f"discreta, version {metadata.version('discreta')}\n", "")
+
+
+@pytest.mark.usefixtures("compiled_engine")
+def test_survey_on_a_carrier(discreta, monkeypatch):
+    """A few lines: what stands in the table, and what does not."""
+    line = METHODS["carrier_linear"]
+    monkeypatch.setitem(METHODS, "carrier_linear", replace(line, choices={"preload": ("zero",)}))
+    code, out, err = discreta("survey", "carrier_linear", "--width", "4")
+    assert (code, err) == (0, "")
+    title, headings, row, _ = out.splitlines()
+    assert title == (
+        "carrier_linear, width 4: all 256 lines, and 64 of bad timing, 64 to be refused, every "
+        "register compared"
+    )
+    names = ["variant", "largest error", "99.9 %", "on the line", "at", "ends missed"]
+    assert re.split(r"  +", headings.strip()) == names
+    variant, largest, _, where, _, missed = re.split(r"  +", row.strip())
+    assert (variant, missed) == ("preload zero", "0")
+    assert re.fullmatch(r"-?\d+,-?\d+ in \d+ periods", where)
+    # By the lecture less than a step behind, by the division up to a 16th more.
+    assert 0.9 < float(largest) <= 17 / 16
 
 
 @pytest.mark.usefixtures("compiled_engine")
@@ -769,17 +812,64 @@ WIDTH = "choose a whole number from 4 to 32"
 ROOM = "is out of range: width 16 has room for -65536 to 65535; give --width"
 CELLS = "is not a point: give 2 whole numbers of steps"
 PATH_OF = ["simulate", "path"]
+OF_LINES, OF_ARCS = (
+    " or ".join(name for name, method in METHODS.items() if method.curve == curve)
+    for curve in ("line", "arc")
+)
+TIMED_LINE, TIMED_ARC = [*LINE, "--method", "carrier_linear"], [*ARC, "--method"]
 BAD = {
+    # On a carrier
+    "speed x": (
+        [*TIMED_LINE, "--speed", "x"],
+        "Invalid value for '--speed': 'x' is not a speed: give a number like 0.1 or 1/10",
+    ),
+    "speed 0": (
+        [*TIMED_LINE, "--speed", "0"],
+        "Invalid value for '--speed': 0 steps per clock are no speed: choose more than 0",
+    ),
+    "period 0": (
+        [*TIMED_LINE, "--period", "0"],
+        "Invalid value for '--period': period is 0: choose a whole number from 1 to 16777215",
+    ),
+    "a period too short": (
+        [*TIMED_LINE, "--period", "1"],
+        "--period 1: the device takes 2 to 16777215 clocks; choose one of these",
+    ),
+    "too many periods": (
+        [*TIMED_LINE, "--speed", "1e-9"],
+        "the line from 0,0 to 20,9 takes 109658561 periods: width 16 has room for 16777215; raise "
+        "--speed or --period",
+    ),
+    "too few periods": (
+        [*TIMED_ARC, "carrier_circular", "--speed", "1/4"],
+        "the arc from 20,0 to 0,20 has 1.5708 radians and so needs 4 periods or more with formula "
+        "rotation, where it takes 1: too few periods; lower --speed or --period",
+    ),
+    "a speed without a carrier": (
+        [*LINE, "--speed", "1"],
+        "--speed is no option of linear, which has no carrier: leave it out",
+    ),
+    "a period without a carrier": (
+        [*ARC, "--period", "200"],
+        "--period is no option of circular, which has no carrier: leave it out",
+    ),
+    "a formula of a line": (
+        [*TIMED_LINE, "--formula", "plain"],
+        "--formula is no option of carrier_linear, which has --preload: leave it out",
+    ),
+    "more bits than on a carrier": (
+        [*TIMED_LINE, "--width", "25"],
+        "--width 25: carrier_linear has up to 24 bits: choose 4 to 24",
+    ),
     # Methods and their options
     "method": (
         [*LINE, "--method", "circle"],
-        "Invalid value for '--method': there is no method 'circle': choose linear or circular or "
-        "conic",
+        f"Invalid value for '--method': there is no method 'circle': choose {' or '.join(METHODS)}",
     ),
     "prove": (
         ["prove", "linear", "circle"],
-        "Invalid value for 'METHOD...': there is no method 'circle': choose linear or circular or "
-        "conic",
+        "Invalid value for 'METHOD...': there is no method 'circle': choose "
+        f"{' or '.join(METHODS)}",
     ),
     "width 3": ([*LINE, "--width", "3"], f"Invalid value for '--width': width is 3: {WIDTH}"),
     "width 33": ([*LINE, "--width", "33"], f"Invalid value for '--width': width is 33: {WIDTH}"),
@@ -798,15 +888,15 @@ BAD = {
     ),
     "arcs with a method for lines": (
         [*ARC, "--method", "linear"],
-        "method linear draws lines and no arcs: choose circular",
+        f"method linear draws lines and no arcs: choose {OF_ARCS}",
     ),
     "lines with a method for arcs": (
         [*LINE, "--method", "circular"],
-        "method circular draws arcs and no lines: choose linear",
+        f"method circular draws arcs and no lines: choose {OF_LINES}",
     ),
     "a path with a method for arcs": (
         [*PATH_OF, "good.csv", "--method", "circular"],
-        "method circular draws arcs and no lines: choose linear",
+        f"method circular draws arcs and no lines: choose {OF_LINES}",
     ),
     "setting": (
         [*LINE, "--setting", "book"],

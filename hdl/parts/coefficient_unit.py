@@ -48,8 +48,8 @@ class CoefficientUnit(Part):
     Latency: 15 products (series) or 5 (table) of 3n + 10 clocks each. Throughput: the same. Reset:
     0, not busy. Overflow: none for Δφ < ½.
     Error: for Δφ < ½ κ is off by less than 2^−28 and sin Δφ by less than 2^−26 of itself by the
-    terms left out of the series, and both by less than 2^−18 by the table's steps; besides some
-    units of their last place, 2^−(3n + 8).
+    terms left out of the series, and both by less than 2^−18 by the table's steps and 2^−(n + 11)
+    by its entries' rounding; besides some units of their last place, 2^−(3n + 8).
     Source: Ukrainian lecture (the cosine of the angle is computed by its series while the
     interpolation is prepared, or taken from a table).
 

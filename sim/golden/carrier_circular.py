@@ -13,8 +13,9 @@ come, ``pass`` which product it is, ``computed`` whether the period's point is k
 coordinates (signed); XC, YC the centre, XK, YK the end; ``periods``, ``period``, ``timer``,
 ``out_`` as on every carrier. Around them the prepared block: that of the circular interpolator, and
 ``next_end_``, ``next_clockwise``, ``next_periods``, ``next_period``, ``stage``, the angle meter
-(``vx``, ``vy``, ``angle``), the divider (``quotient_angle``, ``rest_angle``) and the coefficient's ``square``,
-``scaled``, ``term``, ``kappa``, ``sine``, ``product``, ``multiplier``, ``order``; and УУ.
+(``vx``, ``vy``, ``angle``), the divider (``quotient_angle``, ``rest_angle``) and the coefficient's
+``square``, ``scaled``, ``term``, ``kappa``, ``sine``, ``product``, ``multiplier``, ``order``,
+``place``; and УУ.
 """
 
 import math
@@ -203,7 +204,7 @@ class CarrierCircular:
         increments, final = self._increments(state)
         after["computed"] = where(due, 0, after["computed"])
         # The next period's products begin.
-        for name, value in self._afresh(state).items():
+        for name, value in self._afresh().items():
             after[name] = where(due, value, after[name])
         after["periods"] = (state["periods"] - due) & (2 ** (self.width + 8) - 1)
         for name, value in self._load(state).items():
@@ -231,10 +232,12 @@ class CarrierCircular:
     def fault(self, state: State) -> Value:
         """Give what the prepared block is answered: 0, or why it is refused."""
         bad = equal(state["next_periods"], 0) | less(state["next_period"], self.least_period)
-        bad = bad | negate(equal(state["quotient_angle"] >> (self.bits - 1), 0))
+        wide = negate(equal(state["quotient_angle"] >> (self.bits - 1), 0))
         if self.formula != "rotation":
             around = (self._swept(state) >> (self.width + 16)) + 1
-            bad = bad | less(state["next_periods"], around * around)
+            wide = wide | less(state["next_periods"], around * around)
+        # A block of no length sweeps no angle, whatever was measured.
+        bad = bad | (wide & negate(state["empty"]))
         return where(equal(state["fault"], 0), where(bad, RANGE, 0), state["fault"])
 
     def empty(self, state: State) -> Value:
@@ -299,7 +302,7 @@ class CarrierCircular:
         after["computed"] = where(finish & complete, 1, state["computed"])
         return after
 
-    def _afresh(self, state: State) -> State:
+    def _afresh(self) -> State:
         """Give what the products of a period begin with."""
         afresh: State = {"digit": self.bits, "px": 0, "py": 0}
         return afresh | ({"pass": 0} if self.formula == "predictor_corrector" else {})
@@ -326,7 +329,7 @@ class CarrierCircular:
         for a, place in (("x", "p1"), ("y", "p2")):
             loaded[place] = (state[f"start_{a}"] - state[f"center_{a}"]) << self.fraction
             loaded |= {f"{a}c": state[f"center_{a}"], f"{a}k": state[f"next_end_{a}"]}
-        loaded |= self._afresh(state)
+        loaded |= self._afresh()
         if self.formula == "rotation":
             return loaded | {"pass": 0, "factor": state["kappa"], "other": state["sine"]}
         return loaded | {"factor": state["quotient_angle"] & (2**self.bits - 1)}

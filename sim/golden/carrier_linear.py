@@ -15,7 +15,7 @@ of fraction, P3, P4 the coordinates (signed), P5, P6 the steps left, SX and SY t
 
 from dataclasses import dataclass
 
-from discreta.sim.golden.carrier import PERIOD_BITS, put_out, put_out_registers, signed
+from discreta.sim.golden.carrier import PERIOD_BITS, put_out, put_out_registers
 from discreta.sim.golden.logic import Value, equal, less, negate, where
 
 __all__ = ["CarrierLinear"]

@@ -13,7 +13,6 @@ from discreta.hdl.carrier import (
     periods_bits,
     timed_layout,
 )
-from discreta.hdl.contract import point_layout
 from discreta.hdl.quadrant import line_block_layout
 from tests.hdl.parts.clocked import BAD_WIDTHS, assert_refused, run
 

@@ -166,6 +166,8 @@ def few_arcs(width, formula):
     rows = [[*row, least + index] for index, row in enumerate(FEW)]
     rows.append([15, 0, 0, 15, 0, 0, 0, 0, 0, least])
     rows.append([1, 1, 2, 1, 2, 2, 0, 0, 6, least - 1])
+    # It comes to its end a period early: 72° of 90 are (0.31, 0.95).
+    rows.append([1, 0, 0, 1, 0, 0, 0, 0, 5, least])
     return np.array(rows)
 
 
@@ -173,23 +175,23 @@ def few_arcs(width, formula):
     ("variant", "stalls"),
     [
         *((variant, Stalls(1, stall=0.5, gap=0.3)) for variant in VARIANTS),
-        *((variant, NO_STALLS) for variant in (PLAIN, CORRECTED)),
-        (LECTURE, Stalls(2, stall=0.98)),
+        (PLAIN, NO_STALLS),
     ],
     ids=lambda value: names(value) if isinstance(value, dict) else str(value),
 )
 def test_every_register_at_every_clock_in_pysim(variant, stalls):
     blocks = few_arcs(4, variant["formula"])
     if variant["formula"] == "rotation":
-        blocks = blocks[[0, 2, 1, 3, 4]]
+        blocks = blocks[[0, 2, 8, 1, 3, 4]]
     found = assert_equal(PysimModel, 4, variant, blocks, stalls)
     assert set(found["reg_error"]) == {0, RANGE, OFF_CURVE}
     assert set(found["reg_clockwise"]) == {0, 1}
 
 
 @pytest.mark.usefixtures("compiled_engine")
-@pytest.mark.parametrize(("width", "variant"), [(8, SERIES), (16, CORRECTED)])
-def test_every_register_at_every_clock_compiled(width, variant):
+def test_every_register_at_every_clock_compiled():
+    # Those of 16 bits are seen behind a second stage, in test_two_stage.py.
+    width, variant = 8, SERIES
     rows = timed_arcs(width, 8, 3, formula=variant["formula"], radius=2 ** (width - 2), slack=30)
     rows = [row for row in rows if row[8] < 8][:4]
     # Far out, where every bit of a coordinate counts.
@@ -255,7 +257,7 @@ def formula_points(block, formula, count):
             dx, dy = dx - kappa * x, dy - kappa * y
             x, y = x + dx, y + dy
         points.append((x, y))
-    return np.array(points) + (xc, yc)
+    return np.array(points) + np.array([xc, yc])
 
 
 def split(taken, blocks, codes):
@@ -302,8 +304,9 @@ def assert_arcs(model, width, variant, blocks):
             # Half a step for the whole part, a quarter for the angle that was measured.
             assert off.max() < 0.75, (block, off)
             largest = max(largest, off.max())
-        if len(part) < periods:
-            assert periods > 1
+        # Period N − 1 is the last one just when it comes to the end.
+        if len(part) == periods > 1:
+            assert points[-2].tolist() != end.tolist(), block
     clocks = column(run.events, "clock")
     runs = list(run_arcs(blocks, map(len, parts), width=width, **variant))
     assert clocks[column(run.events, "accepted") == 1].tolist() == [one.accepted for one in runs]
@@ -316,14 +319,14 @@ def assert_arcs(model, width, variant, blocks):
 
 @pytest.mark.parametrize(
     ("width", "variant"),
-    [(4, LECTURE), (4, PLAIN), (4, CORRECTED), (4, SERIES), (4, TABLE), (5, PLAIN)],
+    [(4, LECTURE), (5, PLAIN), (4, CORRECTED), (4, SERIES), (4, TABLE)],
     ids=lambda value: names(value) if isinstance(value, dict) else str(value),
 )
 def test_points_and_clocks_of_blocks_and_between_them(width, variant):
     """Every clock of acceptance, increments and answers, and every point, by the docstring."""
     formula = variant["formula"]
     rows = few_arcs(width, formula).tolist()
-    count = {"plain": 12, "predictor_corrector": 6, "rotation": 2}[formula]
+    count = {"plain": 7, "predictor_corrector": 4, "rotation": 2}[formula]
     rows += [
         row
         for row in timed_arcs(width, count, 4, formula=formula, radius=7)
@@ -480,7 +483,7 @@ def test_preparation_is_the_clock_of_the_start(variant):
     assert core.preparation == started
 
 
-@pytest.mark.parametrize("variant", [PLAIN, CORRECTED, SERIES, TABLE], ids=names)
+@pytest.mark.parametrize("variant", [CORRECTED, SERIES], ids=names)
 def test_registers_hold_every_flip_flop(variant):
     smt = pytest.importorskip("discreta.sim.smt")
     core = CarrierCircular(4, **variant)
@@ -489,8 +492,7 @@ def test_registers_hold_every_flip_flop(variant):
         register.name for group in core.diagram.values() for register in group
     ]
     assert {name: len(register) for name, register in core.registers.items()} == {
-        name: bits
-        for name, (bits, _) in GoldenCarrierCircular(4, **variant).registers().items()
+        name: bits for name, (bits, _) in GoldenCarrierCircular(4, **variant).registers().items()
     }
 
 

@@ -2,17 +2,20 @@ import os
 import re
 import subprocess
 import sys
-from functools import cache
+from functools import cache, partial
 from importlib import metadata
 from pathlib import Path
 
 import pytest
 
 import discreta
+from discreta.hdl.carrier_circular import CarrierCircular
+from discreta.hdl.carrier_linear import CarrierLinear
 from discreta.hdl.circular import Circular
 from discreta.hdl.conic import Conic
 from discreta.hdl.linear import Linear
 from discreta.hdl.plain import PlainPorts
+from discreta.hdl.two_stage import two_stage_linear
 from discreta.hdl.verilog import verilog
 from discreta.sim.golden.circular import Circular as GoldenCircular
 from discreta.sim.golden.conic import Conic as GoldenConic
@@ -243,6 +246,37 @@ def test_text_names_no_machine_and_reads_anywhere(method):
     assert max(map(len, comment.splitlines())) <= 100
     for word in ("yosys", "amaranth", "python", "/root", "/home", ".py", "\t", str(Path.cwd())):
         assert word.lower() not in text.lower()
+
+
+@pytest.mark.parametrize("method", ["carrier_linear", "carrier_circular", "two_stage_linear"])
+def test_on_a_carrier(method):
+    """A block has its timing; the steps are those of a period, or one by one again."""
+    device = {
+        "carrier_linear": CarrierLinear,
+        "carrier_circular": partial(CarrierCircular, formula="plain"),
+        "two_stage_linear": two_stage_linear,
+    }[method]
+    text = verilog(device(8), f"discreta_{method}")
+    assert_plain(text)
+    assert text.isascii()
+    comment, _, module = text.partition("\nmodule ")
+    header = module.partition("(")[2].partition(");")[0]
+    assert max(map(len, comment.splitlines())) <= 105
+    assert ":attr:" not in comment
+    ports = [line.strip() for line in header.split(",")]
+    for port in ("input wire [15:0] blocks_periods", "input wire [23:0] blocks_period"):
+        assert port in ports
+    rows = dict(re.findall(r"^// (\w+) +(?:in|out)put +(\d.*)$", comment, re.MULTILINE))
+    assert rows["blocks_periods"].endswith("block: carrier periods that it takes, N")
+    assert rows["blocks_period"].endswith("block: clocks of a carrier period, T")
+    at_once = not method.startswith("two_stage")
+    steps = (
+        "10  signed   steps of the period along x" if at_once else " 2  signed   steps to make al"
+    )
+    assert rows["steps_x"].startswith(steps.strip())
+    assert (
+        rows["steps_last"].split(maxsplit=1)[1] == "the steps are the last ones of their block"
+    ) == (at_once)
 
 
 @pytest.mark.parametrize("name", ["", "1st", "a b", "a.b", "a$b", "a\n", "\\a", "длина"])

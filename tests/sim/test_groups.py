@@ -1,11 +1,13 @@
 """Which blocks a survey has: as many as said, all of them different, and the same every time."""
 
+import re
 from math import hypot, pi, sqrt
 
 import numpy as np
 import pytest
 
 from discreta.sim import groups
+from discreta.sim.arcs import RANGE
 from discreta.sim.conics import KINDS, motion
 from discreta.sim.groups import SAMPLE_BUDGET, SEED, WHOLE_BUDGET, survey_groups, whole_degrees
 from discreta.sim.methods import METHODS
@@ -43,6 +45,56 @@ def test_lines(width):
     assert not group.answers.any()
 
 
+TIMED = [method for method in METHODS.values() if method.timed]
+
+
+@pytest.mark.parametrize("method", TIMED, ids=lambda method: method.name)
+@pytest.mark.parametrize("width", [4, 8, 11])
+def test_blocks_on_a_carrier(method, width):
+    models = [method.model(width, **variant) for variant in method.variants()]
+    least = max(model.least_period for model in models)
+    for group in survey_groups(method, width):
+        blocks, period = group.blocks, group.blocks[:, -1]
+        good = group.answers == 0
+        assert set(group.answers[~good]) == {RANGE}
+        assert re.fullmatch(
+            rf"(all|a sample \(seed {SEED}\) of) {sum(good)} (lines|quarter arcs|circles|arcs), "
+            "and 64 of bad timing",
+            group.title,
+        )
+        assert np.count_nonzero(~good) == 64
+        assert not group.lengths[~good].any()
+        # What is refused follows the same block.
+        behind = np.flatnonzero(~good)
+        shapes = blocks[:, :-2]
+        alike = (shapes[behind] == shapes[behind - 1]).all(axis=1)
+        assert alike.all()
+        bad = blocks[~good]
+        assert np.all((bad[:, -2] == 0) | (bad[:, -1] < 2) | (bad[:, -2] == 1))
+        blocks, period, lengths = blocks[good], period[good], group.lengths[good]
+        assert (period.min(), period.max()) >= (least, least)
+        assert period.max() <= least + 64
+        assert np.sum(blocks[:, -2] * period) <= SAMPLE_BUDGET
+        if method.curve == "line":
+            steps = lengths / blocks[:, -2]
+            assert steps.max() <= 20
+            assert steps[lengths > 9].min() > 0.28
+        else:
+            start, end = blocks[:, :2] - blocks[:, 4:6], blocks[:, 2:4] - blocks[:, 4:6]
+            way = np.where(blocks[:, 6] == 1, -1, 1)
+            phi = way * (np.arctan2(*end.T[::-1]) - np.arctan2(*start.T[::-1]))
+            phi = np.where(phi > 1e-9, phi, phi + 2 * pi)
+            assert np.all(phi / blocks[:, -2] < 0.5)
+            assert np.all(blocks[:, -2] >= (np.floor(phi) + 1) ** 2)
+            assert np.all(blocks[:, -2] >= np.hypot(*start.T) * phi / 20 - 1e-9)
+
+
+@pytest.mark.parametrize("method", TIMED, ids=lambda method: method.name)
+def test_blocks_on_a_carrier_that_would_take_too_long(method):
+    with pytest.raises(ValueError, match=r"^width 12 is too large .* choose a width up to 11$"):
+        survey_groups(method, 12)
+
+
 @pytest.fixture
 def few_conics(monkeypatch):
     """Have few curves, for what does not depend on their number."""
@@ -51,7 +103,7 @@ def few_conics(monkeypatch):
 
 
 @pytest.mark.usefixtures("few_conics")
-@pytest.mark.parametrize("method", [LINES, ARCS, CONICS])
+@pytest.mark.parametrize("method", [LINES, ARCS, CONICS, *TIMED])
 def test_the_same_every_time(method):
     for group, again in zip(survey_groups(method, 10), survey_groups(method, 10), strict=True):
         assert group.title == again.title

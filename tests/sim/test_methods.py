@@ -159,6 +159,7 @@ def test_no_point_of_a_line_on_a_carrier_is_farther_than_the_bound(preload):
     method, width = METHODS["carrier_linear"], 8
     golden = method.model(width, preload=preload)
     bound = method.bound(golden)
+    assert bound is not None
     random = np.random.default_rng(6)
     worst = 0.0
     for _ in range(300):

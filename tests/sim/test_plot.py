@@ -216,6 +216,47 @@ def test_the_window_shows_a_large_circle(tmp_path, radius):
     assert all(any(text.startswith(number) for text in written) for number in tens)
 
 
+def moves_of(svg, name, count):
+    """Give the height of a curve of steps in the middle of every period, in the picture's units."""
+    x, y = vertices(svg, f"moves-{name}").T
+    middles = np.interp((np.arange(count) + 0.5) / count, (0, 1), (x[0], x[-1]))
+    return y[np.searchsorted(x, middles, side="right") - 1]
+
+
+@pytest.mark.parametrize("cuts", [[], [1, 4]])
+def test_what_every_period_moves_is_drawn(tmp_path, cuts):
+    moves = np.array([[5, 2], [4, 2], [-1, 0], [0, -3], [9, 4], [9, -9], [0, 0], [7, 1]])
+    points = np.cumsum(moves, axis=0)
+    curve = Polyline([(0, 0), points[-1]])
+    plot = PathPlot(curve, periods=True)
+    for part in np.split(points, cuts):
+        plot.follow(part, np.full(len(part), 0.5))
+    plot.save(tmp_path / "picture.svg", ".svg", "a path")
+    svg = (tmp_path / "picture.svg").read_bytes()
+    seen = np.stack([moves_of(svg, name, len(moves)) for name in "xy"])
+    # Both curves have one scale.
+    unit = (seen[0].max() - seen[0].min()) / 10
+    assert (seen - seen[0, -2]) / unit == pytest.approx(moves.T, abs=1e-3)
+    for text in ("steps per period", "steps along x", "distance from the true path", "periods"):
+        assert text in texts(svg)
+    assert "steps taken" not in texts(svg)
+
+
+def test_of_many_periods_the_mean_is_drawn(tmp_path):
+    count = 5000
+    moves = np.array([[0, 3], [1, 0]] * (count // 2))
+    plot = PathPlot(Polyline([(0, 0), moves.sum(axis=0)]), periods=True)
+    plot.follow(np.cumsum(moves, axis=0), np.zeros(count))
+    plot.save(tmp_path / "picture.svg", ".svg", "a path")
+    svg = (tmp_path / "picture.svg").read_bytes()
+    assert "steps per period, the mean of every 4" in texts(svg)
+    # The first column has three periods, as number 0 is the start, and the last one.
+    seen = np.stack([moves_of(svg, name, count) for name in "xy"])[:, [0, count // 2, -1]]
+    heights = np.array([[1 / 3, 1 / 2, 1], [2, 3 / 2, 0]])
+    scaled = (seen - seen[1, 2]) / (seen[1, 0] - seen[1, 2]) * 2
+    assert scaled == pytest.approx(heights, abs=1e-3)
+
+
 def test_names_of_pictures():
     assert picture_format("a/b.c.SVG") == ".svg"
     assert picture_format("x.png") == ".png"

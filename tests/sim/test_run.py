@@ -167,13 +167,22 @@ def test_a_line_on_a_carrier(tmp_path):
     trace = tmp_path / "t.csv"
     line, speed, period = Polyline([(-3, 5), (30, -39)]), Fraction(1, 7), 30
     method = METHODS["carrier_linear"]
-    options = {"speed": speed, "period": period, "preload": "zero"}
-    summary = run(line, method, width=6, engine="pysim", trace=str(trace), **options)
+    summary = run(
+        line,
+        method,
+        width=6,
+        engine="pysim",
+        trace=str(trace),
+        speed=speed,
+        period=period,
+        preload="zero",
+    )
     # 55 steps long.
     periods = -(-55 * 7 // period)
     means = [Fraction(delta * 2**18 // periods, 2**18) for delta in (33, 44)]
     expected = [(int(i * means[0]) - 3, 5 - int(i * means[1])) for i in range(periods)]
-    rows = [[int(cell) for cell in row] for row in list(csv.reader(trace.open()))[1:]]
+    _, *lines = csv.reader(trace.read_text().splitlines())
+    rows = [[int(cell) for cell in row] for row in lines]
     assert [tuple(point) for _, *point in rows] == [*expected, (30, -39)]
     clocks = [clock for clock, *_ in rows]
     assert set(np.diff(clocks[1:])) == {period}
@@ -222,14 +231,16 @@ def test_paths_on_a_carrier_say_what_their_lines_have_together():
 
 
 def test_a_timing_that_cannot_be_is_refused():
-    fast = {"speed": Fraction(1), "width": 8}
+    fast = Fraction(1)
     with pytest.raises(BadInputError, match=r"too few periods; lower --speed or --period$"):
-        run(ARC, METHODS["carrier_circular"], **fast)
+        run(ARC, METHODS["carrier_circular"], width=8, speed=fast)
     with pytest.raises(BadInputError, match=r"^--period 101: the device takes 102 to 16777215 clo"):
-        run(ARC, METHODS["two_stage_circular"], period=101, **fast)
-    for given in ({"speed": Fraction(1)}, {"period": 9}):
-        with pytest.raises(BadInputError, match=r" is no option of circular, which has no carrier"):
-            run(ARC, CIRCULAR, **given)
+        run(ARC, METHODS["two_stage_circular"], width=8, period=101)
+    without = r" is no option of circular, which has no carrier"
+    with pytest.raises(BadInputError, match=f"^--speed{without}"):
+        run(ARC, CIRCULAR, speed=fast)
+    with pytest.raises(BadInputError, match=f"^--period{without}"):
+        run(ARC, CIRCULAR, period=9)
     with pytest.raises(BadInputError, match=r"^the line has 3 axes and method carrier_linear 2: c"):
         run(Polyline([(0, 0, 0), (1, 2, 3)]), METHODS["carrier_linear"])
 

@@ -12,6 +12,7 @@ from amaranth import Signal
 from click.testing import CliRunner
 
 from discreta.cli import cli
+from discreta.hdl.carrier_linear import CarrierLinear
 from discreta.hdl.circular import Circular
 from discreta.hdl.contract import ErrorCode
 from discreta.hdl.linear import Linear
@@ -30,6 +31,7 @@ from tests.conics import conic_steps, first_way, run_conics, velocity
 from tests.lines import distance, line_steps
 
 LINES, ARCS, CONICS = METHODS["linear"], METHODS["circular"], METHODS["conic"]
+CARRIER = METHODS["carrier_linear"]
 
 #: The arcs' method without normalizer and guard bits: order and preload alone.
 PLAIN = replace(ARCS, choices={**ARCS.choices, "normalize": (False,), "guard": (0,)})
@@ -209,7 +211,7 @@ def test_conics_of_5_bits():
         # Parts and budget are shared out by about the clocks that they take; what simultaneous
         # sums lead farther and farther out takes more.
         golden = CONICS.model(5, **row.variant)
-        expected = module._CURVES["conic"].clocks(CONICS, golden, group).sum()
+        expected = module._CURVES["conic", False].clocks(CONICS, golden, group).sum()
         assert row.clocks > 0.75 * expected
         assert row.clocks < 1.25 * expected or golden.order == "simultaneous"
 
@@ -356,6 +358,62 @@ def amend(part, change):
         return m
 
     part.elaborate = amended
+
+
+def few(method, width, count):
+    """Give some blocks of every group, the first of bad timing with them."""
+    for group in survey_groups(method, width):
+        first = int(np.flatnonzero(group.answers)[0])
+        chosen = slice(max(0, first - count // 2), first + count)
+        parts = {name: getattr(group, name)[chosen] for name in ("blocks", "answers", "lengths")}
+        yield replace(group, **parts)
+
+
+@pytest.mark.usefixtures("compiled_engine", "one_process")
+def test_a_carrier(monkeypatch):
+    """Every register equal, every block judged, and worst where the line's own formula has it."""
+    groups = list(few(CARRIER, 5, 40))
+    (group,) = groups
+    row = row_of(broken(monkeypatch, CARRIER, CarrierLinear, preload=("zero",)), 5, groups)
+    assert row.good
+    assert (row.compared, row.completed) == (len(group.blocks), 0)
+    assert 0 < np.count_nonzero(group.answers) == row.blocks - len(row.block_errors)
+    errors = []
+    for *line, periods, _ in group.blocks[group.answers == 0].tolist():
+        start, end = line[:2], line[2:]
+        length = [b - a for a, b in zip(start, end, strict=True)]
+        off = [0.0]
+        for i in range(periods):
+            moved = [(abs(delta) * 2**17 // periods * i) >> 17 for delta in length]
+            signs = [np.sign(delta) for delta in length]
+            point = [a + s * m for a, s, m in zip(start, signs, moved, strict=True)]
+            off.append(distance(point, start, end))
+        errors.append(max(off))
+    np.testing.assert_allclose(row.block_errors, errors, atol=1e-9)
+    assert row.largest_error == pytest.approx(max(errors))
+    line, point = say_worst(CARRIER, group, row)
+    assert re.fullmatch(r"-?\d+,-?\d+ in \d+ periods", line)
+    assert re.fullmatch(r"-?\d+,-?\d+", point)
+
+
+class Hasty(CarrierLinear):
+    """Runs what has no time to run."""
+
+    def elaborate(self, platform):
+        def change(m):
+            m.d.comb += self.uu.fault.eq(0)
+
+        m = super().elaborate(platform)
+        change(m)
+        return m
+
+
+@pytest.mark.usefixtures("compiled_engine", "one_process")
+def test_a_bad_timing_that_is_run_is_reported(monkeypatch):
+    (group,) = few(CARRIER, 5, 9)
+    row = row_of(broken(monkeypatch, CARRIER, Hasty, preload=("half",)), 5, [group])
+    assert row.ends_missed > 0
+    assert row.findings
 
 
 class Late(Linear):

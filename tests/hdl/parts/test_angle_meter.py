@@ -12,16 +12,18 @@ from discreta.hdl.parts.angle_meter import (
 from discreta.sim.golden.carrier_circular import CarrierCircular
 from tests.hdl.parts.clocked import BAD_WIDTHS, assert_refused, run
 
+Point = tuple[int, int]
+
 #: The most axis crossings that an arc can make: 255 full turns and one that begins between axes.
 MOST_TURNS = 1024
 
 
-def true_angle(start, end, turns):
+def true_angle(start: Point, end: Point, turns: int) -> float:
     """Give the angle swept, in radians; a double is good for some 2^−42 of it."""
     return turns * pi / 2 + atan2(end[1], end[0]) - atan2(start[1], start[0])
 
 
-def possible(start, end, turns):
+def possible(start: Point, end: Point, turns: int) -> bool:
     """Tell whether input processing can give such an arc: its end is on it, and ahead."""
     s, e = (x * x + y * y for x, y in (start, end))
     near = (e + s - 1) ** 2 <= 4 * e * s
@@ -30,18 +32,18 @@ def possible(start, end, turns):
     return start[0] > 0 and end[1] > 0 and near and (ahead or turns > 0)
 
 
-def draw_arc(rng, width):
+def draw_arc(rng: np.random.Generator, width: int) -> tuple[Point, Point, int]:
     """Draw start, end and crossings of an arc that is possible; small and large alike."""
     while True:
         radius = 2 ** rng.uniform(0, width)
-        points = []
+        points: list[Point] = []
         for angle in rng.random(2) * pi / 2:
             away = radius + rng.uniform(-0.7, 0.7)
             points.append((round(away * np.cos(angle)), round(away * np.sin(angle))))
         turns = int(rng.choice([0, 0, 1, 2, 3, 4, 7, MOST_TURNS]))
         inside = max(max(point) for point in points) < 2**width
-        if inside and min(map(min, points)) >= 0 and possible(*points, turns):
-            return *points, turns
+        if inside and min(map(min, points)) >= 0 and possible(points[0], points[1], turns):
+            return points[0], points[1], turns
 
 
 async def measure(ctx, part, start, end, turns):
@@ -88,7 +90,7 @@ def test_error_of_the_part(width):
 
 def test_the_sizes_of_what_it_measures():
     assert (angle_bits(8), turnings(8)) == (24, 14)
-    assert 2**ANGLE_INTEGER_BITS > (MOST_TURNS + 4) * pi / 2
+    assert (MOST_TURNS + 4) * pi / 2 < 2**ANGLE_INTEGER_BITS
     part = AngleMeter(8)
 
     async def bench(ctx):
@@ -151,7 +153,9 @@ def golden_angles(width, arcs):
     columns = np.array([[*start, *end, turns] for start, end, turns in arcs]).T.astype(kind)
     state = {name: np.zeros(len(arcs), kind) for name in golden.registers()}
     state["stage"] = np.zeros(len(arcs), np.int64)
-    for name, column in zip(("from_x", "from_y", "to_x", "to_y", "first_turns"), columns, strict=True):
+    for name, column in zip(
+        ("from_x", "from_y", "to_x", "to_y", "first_turns"), columns, strict=True
+    ):
         state[name] = column
     state["held"] = state["held"] + 1
     state["next_periods"] = state["next_periods"] + 1

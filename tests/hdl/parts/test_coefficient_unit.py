@@ -77,10 +77,10 @@ async def compute(ctx, part, angle):
 
 
 @pytest.mark.parametrize("coefficient", COEFFICIENTS)
-@pytest.mark.parametrize(("width", "count"), [(4, 6), (8, 4), (16, 2)])
+@pytest.mark.parametrize(("width", "count"), [(4, 3), (8, 2), (16, 1)])
 def test_error_and_latency_of_the_part(width, count, coefficient):
     part = CoefficientUnit(width, coefficient=coefficient)
-    count *= 1 if coefficient == "series" else 3
+    count *= 1 if coefficient == "series" else 2
 
     async def bench(ctx):
         assert [ctx.get(register) for register in part.registers] == [0] * len(part.registers)
@@ -112,13 +112,11 @@ def golden_coefficients(width, coefficient, angles):
 
 @pytest.mark.parametrize(
     ("width", "coefficient", "count"),
-    [(4, "series", 60), (4, "table", 60), (8, "series", 40), (8, "table", 40), (16, "series", 20)],
+    [(4, "series", 40), (4, "table", 40), (8, "series", 30), (8, "table", 30), (16, "series", 10)],
 )
 def test_error_of_many_angles(width, coefficient, count):
     angles = draw_angles(width, count, seed=2)
-    for angle, found in zip(
-        angles, golden_coefficients(width, coefficient, angles), strict=True
-    ):
+    for angle, found in zip(angles, golden_coefficients(width, coefficient, angles), strict=True):
         assert_near(width, coefficient, angle, found)
 
 
@@ -128,9 +126,7 @@ def test_the_part_computes_what_the_golden_model_does(coefficient):
     part = CoefficientUnit(8, coefficient=coefficient)
 
     async def bench(ctx):
-        for angle, wanted in zip(
-            angles, golden_coefficients(8, coefficient, angles), strict=True
-        ):
+        for angle, wanted in zip(angles, golden_coefficients(8, coefficient, angles), strict=True):
             assert (await compute(ctx, part, angle))[:2] == wanted, angle
 
     run(part, bench)
@@ -138,11 +134,9 @@ def test_the_part_computes_what_the_golden_model_does(coefficient):
 
 def test_in_units_of_the_last_place_at_four_bits():
     """Some hundreds of angles: at most 3 of 2^−20 by series, 10 (κ) and 20 (sine) by table."""
-    angles = list(range(0, 2**19, 97 * 16))
+    angles = list(range(0, 2**19, 97 * 64))
     for coefficient, most in (("series", (3, 3)), ("table", (10, 20))):
-        for angle, found in zip(
-            angles, golden_coefficients(4, coefficient, angles), strict=True
-        ):
+        for angle, found in zip(angles, golden_coefficients(4, coefficient, angles), strict=True):
             true = kappa_and_sine(Fraction(angle, 2**20))
             for value, exact, units in zip(found, true, most, strict=True):
                 assert abs(value - exact * 2**20) <= units, (coefficient, angle)

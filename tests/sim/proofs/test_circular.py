@@ -42,7 +42,7 @@ def test_everything_is_proven_of_what_the_variants_share():
 
 def test_arcs_have_sixteen_variants_that_share_something_and_lines_do_not():
     assert len(METHOD.variants()) == 16
-    assert [name for name in METHODS if shares(name)] == ["circular", "conic"]
+    assert [name for name in METHODS if shares(name)] == ["comparison", "circular", "conic"]
 
 
 @pytest.mark.parametrize("width", [8, 16, 32])
