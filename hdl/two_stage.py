@@ -54,8 +54,9 @@ class TwoStage(Part):
     Overflow, errors: those of the first stage.
 
     Error bound: between two points of the first stage the steps are off their straight line by at
-    most √½ step (preload ½), or less than one (0), and this line by the first stage's own error at
-    its ends; an arc lies R·Δφ²/8 beyond it in the middle. The end point is exact.
+    most √½ step (preload ½), or by less than one on each axis (0), and this line by the first
+    stage's own error at its ends; an arc lies R·Δφ²/8 beyond it in the middle. The end point is
+    exact.
 
     Source: Ukrainian lecture (increments are handed on once a carrier period); lecture, linear
     interpolation. The modulus T is ours.
