@@ -28,14 +28,13 @@ def test_a_turn_drifts_as_the_page_says():
 
 
 @pytest.mark.usefixtures("compiled_engine")
-@pytest.mark.parametrize("formula", ["plain", "rotation"])
-def test_the_last_increment_makes_up_for_no_more_than_the_drift(formula):
+def test_the_last_increment_makes_up_for_no_more_than_the_drift():
     """\\|last − R·Δφ\\| ≤ √(off² + along²) + 2 for every block of the survey's sample."""
     width = 6
     group = survey_groups(CARRIER, width)[-1]
     admitted = np.flatnonzero(group.answers == 0)[:60]
     blocks = group.blocks[admitted]
-    choices = {"formula": formula, "coefficient": "series", "preload": "half"}
+    choices = {"formula": "plain", "coefficient": "series", "preload": "half"}
     limit = int(CARRIER.clocks(CARRIER.model(width, **choices), blocks).sum()) + 2
     core = CARRIER.core(width, **choices)
     events = np.concatenate(
@@ -47,9 +46,7 @@ def test_the_last_increment_makes_up_for_no_more_than_the_drift(formula):
     radius = np.sqrt(np.array([float(square) for square, _ in squared_radii(blocks)]))
     swept, periods = angles(blocks), blocks[:, -2].astype(float)
     turned = swept / periods
-    off = along = np.zeros(len(blocks))
-    if formula == "plain":
-        off, along = radius * np.expm1(swept * turned / 2), radius * swept * turned**2 / 3
+    off, along = radius * np.expm1(swept * turned / 2), radius * swept * turned**2 / 3
     differs = np.abs(np.hypot(*last.T) - radius * turned)
     assert np.all(differs <= np.hypot(off, along) + 2)
     # And the bound is no empty promise.
