@@ -1,6 +1,7 @@
 """What docs/carrier_circular.md says of the drift and of the last increment, measured again."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ def test_the_last_increment_makes_up_for_no_more_than_the_drift():
     group = survey_groups(CARRIER, width)[-1]
     admitted = np.flatnonzero(group.answers == 0)[:60]
     blocks = group.blocks[admitted]
-    choices = {"formula": "plain", "coefficient": "series", "preload": "half"}
+    choices: dict[str, Any] = {"formula": "plain", "coefficient": "series", "preload": "half"}
     limit = int(CARRIER.clocks(CARRIER.model(width, **choices), blocks).sum()) + 2
     core = CARRIER.core(width, **choices)
     events = np.concatenate(
