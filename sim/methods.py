@@ -266,6 +266,17 @@ def _alone(blocks: np.ndarray) -> np.ndarray:
     return longest
 
 
+#: Those of arcs on a carrier, in one stage or two.
+_CARRIER_ARC_CHOICES: dict[str, tuple[Any, ...]] = {
+    "formula": FORMULAS,
+    "coefficient": COEFFICIENTS,
+    "preload": ("half", "zero"),
+}
+_CARRIER_ARC_SETTINGS: dict[str, dict[str, Any]] = {
+    "default": {"formula": "rotation", "coefficient": "series", "preload": "half"},
+    "lecture": CarrierCircular.LECTURE,
+}
+
 METHODS = {
     method.name: method
     for method in (
@@ -379,19 +390,8 @@ METHODS = {
             device=CarrierCircular,
             golden=GoldenCarrierCircular,
             axes=(2,),
-            choices={
-                "formula": FORMULAS,
-                "coefficient": COEFFICIENTS,
-                "preload": ("half", "zero"),
-            },
-            settings={
-                "default": {
-                    "formula": "rotation",
-                    "coefficient": "series",
-                    "preload": "half",
-                },
-                "lecture": CarrierCircular.LECTURE,
-            },
+            choices=_CARRIER_ARC_CHOICES,
+            settings=_CARRIER_ARC_SETTINGS,
             clocks=_carrier_circular_clocks,
             bound=lambda _: None,
             max_width=CARRIER_CIRCULAR_MAX_WIDTH,
@@ -425,19 +425,8 @@ METHODS = {
             device=two_stage_circular,
             golden=golden_two_stage_circular,
             axes=(2,),
-            choices={
-                "formula": FORMULAS,
-                "coefficient": COEFFICIENTS,
-                "preload": ("half", "zero"),
-            },
-            settings={
-                "default": {
-                    "formula": "rotation",
-                    "coefficient": "series",
-                    "preload": "half",
-                },
-                "lecture": CarrierCircular.LECTURE,
-            },
+            choices=_CARRIER_ARC_CHOICES,
+            settings=_CARRIER_ARC_SETTINGS,
             clocks=_two_stage_circular_clocks,
             bound=lambda _: None,
             max_width=CARRIER_CIRCULAR_MAX_WIDTH,
