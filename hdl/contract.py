@@ -46,7 +46,7 @@ class ErrorCode(enum.Enum, shape=2):  # pyright: ignore[reportGeneralTypeIssues,
     #: Nothing is wrong.
     NONE = 0
     #: It does not fit n bits: a line that is too long, an arc that is too large or leaves the
-    #: coordinates there are.
+    #: coordinates there are. Or its timing on a carrier is out of range.
     RANGE = 1
     #: The end is more than one step off the circle around the centre on which the start lies, or
     #: the start is the centre.
