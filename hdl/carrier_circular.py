@@ -434,9 +434,7 @@ class CarrierCircular(Part):
             "y": Mux(self.clockwise, -along, along),
         }
         multiplying = uu.clock & ~self.computed & (self.digit != 0)
-        with m.If(uu.load):
-            m.d.sync += self.digit.eq(bits)
-        with m.Elif(finish | due):
+        with m.If(uu.load | finish | due):
             m.d.sync += self.digit.eq(bits)
         with m.Elif(multiplying):
             m.d.sync += self.digit.eq(self.digit - 1)

@@ -12,6 +12,8 @@ cells' own names carry the axis letter. Around them stand the prepared block (``
 with the block's ``direction_``), and УУ: ``running``, ``done``, ``error``.
 """
 
+from abc import ABC, abstractmethod
+
 from discreta.sim.golden.logic import Value, equal, less, negate, where
 
 __all__ = ["LineFrame", "State"]
@@ -19,7 +21,7 @@ __all__ = ["LineFrame", "State"]
 State = dict[str, Value]
 
 
-class LineFrame:
+class LineFrame(ABC):
     """A line interpolator of n = ``width`` bits in ``axes`` axes, but for what it sums.
 
     A model tells what its summation is by :meth:`sums`, :meth:`summed`, :meth:`increments` and
@@ -40,16 +42,16 @@ class LineFrame:
             return f"d{a}", f"{a}t", f"ko{a}"
         return ("p1", "p3", "p5") if a == "x" else ("p2", "p4", "p6")
 
+    @abstractmethod
     def sums(self) -> dict[str, tuple[int, bool]]:
         """Give the width in bits of every summator and whether it is signed."""
-        raise NotImplementedError
 
+    @abstractmethod
     def summed(self, state: State, clock: Value) -> tuple[State, State]:
         """Give the steps that a summation puts out, by axis letter, and every summator after it.
 
         Without ``clock`` nothing is summed: no steps, and the summators as they are.
         """
-        raise NotImplementedError
 
     def increments(self, state: State) -> State:
         """Give what the increments of the prepared block are, by axis letter."""
