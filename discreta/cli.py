@@ -40,8 +40,10 @@ from discreta.sim.carrier import DEFAULT_PERIOD, DEFAULT_SPEED, MAX_PERIOD
 from discreta.sim.compiled import compiler
 from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
 from discreta.sim.curves import Arc, Conic, Curve, Polyline
+from discreta.sim.machine import Drive
 from discreta.sim.methods import METHODS, Method
 from discreta.sim.outputs import Outputs
+from discreta.sim.plotter import PulseTiming
 from discreta.sim.points import (
     MAX_TURNS,
     BadInputError,
@@ -58,20 +60,28 @@ __all__ = ["main"]
 
 
 class _Point(click.ParamType):
-    """A point: whole numbers of steps, one for every axis."""
+    """A point: whole numbers of steps, one for every axis. Or other whole numbers."""
 
     name = "X,Y"
 
-    def __init__(self, most: int):
-        self._most = most
-        self._count = f"{MIN_AXES} to {most}" if most > MIN_AXES else f"{MIN_AXES}"
+    def __init__(
+        self,
+        most: int,
+        least: int = MIN_AXES,
+        what: str = "a point",
+        unit: str = "steps",
+        like: str = "200,99",
+    ):
+        self._most, self._least = most, least
+        self._count = f"{least} to {most}" if most > least else f"{least}"
+        self._what, self._unit, self._like = what, unit, like
 
     def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, ...]:
         point = parse_point(value.split(","))
-        if point is None or not MIN_AXES <= len(point) <= self._most:
+        if point is None or not self._least <= len(point) <= self._most:
             self.fail(
-                f"{value!r} is not a point: give {self._count} whole numbers of steps with commas "
-                "between, like 200,99",
+                f"{value!r} is not {self._what}: give {self._count} whole numbers of {self._unit} "
+                f"with commas between, like {self._like}",
                 param,
                 ctx,
             )
@@ -283,8 +293,45 @@ _timing_options = _options(
 )
 
 
+#: What a run on the whole device is given; any of them asks for one.
+_DRIVE = ("feed", "accel", "pulse")
+_drive_options = _options(
+    click.option(
+        "--feed",
+        type=_Speed(),
+        help="Run on the whole device, at this speed along the path: steps per clock, up to 1, a "
+        "decimal or a fraction. [default: 1 with any of the four below]",
+    ),
+    click.option(
+        "--accel",
+        type=_Numbers("an acceleration", "1e-6"),
+        metavar="A",
+        help="Acceleration from the start and down to the end, in steps per clock^2; 0 for none. "
+        "[default: 0]",
+    ),
+    click.option(
+        "--pulse",
+        type=_Point(4, 4, "a timing", "clocks", "2,2,5,5"),
+        metavar="L,S,U,H",
+        help="Clocks of the pulses: length, space behind, set-up and hold of the direction. "
+        "[default: 1,1,1,1]",
+    ),
+    click.option(
+        "--plotter",
+        metavar="FILE.svg|.png",
+        help="Picture of what a machine draws that sees only the step and direction pins.",
+    ),
+    click.option(
+        "--screen",
+        metavar="FILE.png|.svg",
+        help="The same on the exercise's own screen, 320 x 200 pixels in four colours.",
+    ),
+)
+
+
 def _run_options(method: str, width: Callable = _width) -> Callable:
     return _options(
+        _drive_options,
         click.option(
             "--method",
             type=_MethodName(),
@@ -581,6 +628,7 @@ def _conic_block(given: dict[str, Any], width: int) -> ConicBlock:
 def _simulate(curve: Curve, *, method: Method, setting: str, **options: Any) -> None:
     choices = _chosen(method, setting, {name: options.pop(name) for name in _CHOICES})
     _check_width(method, options["width"])
+    drive = _drive({name: options.pop(name) for name in _DRIVE}, options)
     trace, vcd = options["trace"], options["vcd"]
     # Without a word the run would only seem slow.
     slow = options["engine"] is None and vcd is None and default_engine() == "pysim"
@@ -595,11 +643,29 @@ def _simulate(curve: Curve, *, method: Method, setting: str, **options: Any) -> 
             show(done, total)
 
         began = time.perf_counter()
-        summary = run(curve, method, progress=progress, **options, **choices)
+        summary = run(curve, method, progress=progress, drive=drive, **options, **choices)
         seconds = time.perf_counter() - began
     _print_summary(summary, seconds, err="-" in (trace, options["summary_file"]))
     if not summary["end point reached"]:
         raise click.exceptions.Exit(1)
+
+
+def _drive(given: dict[str, Any], options: dict[str, Any]) -> Drive | None:
+    """Give what the whole device is programmed with; None when nothing asks for it."""
+    pictures = (options["plotter"], options["screen"])
+    if all(value is None for value in (*given.values(), *pictures)):
+        return None
+    chosen: dict[str, Any] = {}
+    if given["feed"] is not None:
+        chosen["feed"] = given["feed"]
+    if given["accel"] is not None:
+        (chosen["acceleration"],) = given["accel"]
+    if given["pulse"] is not None:
+        try:
+            chosen["timing"] = PulseTiming(*given["pulse"])
+        except ValueError as error:
+            raise BadInputError(f"--pulse: {error}") from None
+    return Drive(**chosen)
 
 
 def _print_summary(summary: dict[str, Any], seconds: float, *, err: bool) -> None:

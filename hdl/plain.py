@@ -8,7 +8,7 @@ from amaranth.lib import data, wiring
 
 from discreta.hdl.contract import Part
 
-__all__ = ["PlainPorts"]
+__all__ = ["PlainPorts", "block_fields"]
 
 
 class PlainPorts(Part):
@@ -32,8 +32,9 @@ class PlainPorts(Part):
     ----------
     inputs, outputs : dict of str to Signal
         The ports, by name, in the order of the interpolator's signature.
-    block_fields, step_fields : tuple of str
-        Those of them that carry a block, and those that carry a step.
+    block_fields, step_fields, control_fields : tuple of str
+        Those of them that carry a block; that carry a step, or the pins of motor drivers; and
+        the inputs beside these streams.
     """
 
     def __init__(self, core: Part, *, observe: Mapping[str, Signal] | None = None):
@@ -56,7 +57,10 @@ class PlainPorts(Part):
             ports = self.inputs if member.flow == wiring.In else self.outputs
             ports[name] = getattr(self, name)
         self.block_fields = _fields("blocks_", self.inputs)
-        self.step_fields = _fields("steps_", self.outputs)
+        self.step_fields = _fields("steps_", self.outputs) or _fields("pins_", self.outputs)
+        self.control_fields = tuple(
+            name for name in self.inputs if not name.startswith(("blocks_", "steps_"))
+        )
 
     def elaborate(self, platform):
         """Describe the hardware."""
@@ -65,6 +69,12 @@ class PlainPorts(Part):
         m.d.comb += [self._inner[name].eq(port) for name, port in self.inputs.items()]
         m.d.comb += [port.eq(self._inner[name]) for name, port in self.outputs.items()]
         return m
+
+
+def block_fields(core: Part) -> tuple[str, ...]:
+    """Name the plain ports of an interpolator's or a device's blocks."""
+    payload = core.blocks.payload
+    return tuple(name for name, *_ in _leaves(("blocks",), payload.shape(), payload))
 
 
 def _leaves(path, shape, value):

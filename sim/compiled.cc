@@ -18,7 +18,10 @@ struct Port {
 	unsigned width = 0;
 	bool is_signed = false;
 
+	// A port that the design does not have is 0, and nothing is done by setting it.
 	int64_t get() const {
+		if (curr == nullptr)
+			return 0;
 		uint64_t value = curr[0];
 		if (width > 32)
 			value |= uint64_t(curr[1]) << 32;
@@ -28,6 +31,8 @@ struct Port {
 	}
 
 	void set(int64_t value) {
+		if (next == nullptr)
+			return;
 		uint64_t bits = uint64_t(value);
 		if (width < 64)
 			bits &= (uint64_t(1) << width) - 1;
@@ -47,8 +52,9 @@ uint64_t draw(uint64_t seed, uint64_t clock, uint64_t channel) {
 
 struct Bench {
 	cxxrtl_handle design;
-	Port clk, rst, blocks_valid, blocks_ready, steps_valid, steps_ready, done, error;
-	std::vector<Port> block_fields, step_fields, watched;
+	Port clk, rst, blocks_valid, blocks_ready, steps_valid, steps_ready, done, error, busy, reason;
+	std::vector<Port> block_fields, step_fields, watched, controls;
+	std::vector<int64_t> pins; // what the step fields were a clock ago
 	uint64_t clock = 0;
 	bool offering = false;
 
@@ -71,6 +77,19 @@ struct Bench {
 		rst.set(0);
 		clock = 0;
 		offering = false;
+		pins.clear();
+	}
+
+	// Whether a pin has changed since the clock before.
+	bool pins_changed() {
+		bool changed = false, first = pins.empty();
+		pins.resize(step_fields.size());
+		for (size_t k = 0; k < step_fields.size(); k++) {
+			int64_t level = step_fields[k].get();
+			changed |= !first && level != pins[k];
+			pins[k] = level;
+		}
+		return changed;
 	}
 };
 
@@ -99,11 +118,16 @@ struct Request {
 	int64_t *events;         // [event_room][5 + step fields]; nullptr: none recorded
 	uint64_t event_room;
 	int64_t *watch;          // [clocks][watched]; nullptr: none recorded
+	const int64_t *orders;   // [order_count][3]: from which clock on, which control, its value
+	uint64_t order_count;
+	uint64_t until_idle;     // stop when nothing is busy and all blocks are fed, or none is taken
 	// answers
 	uint64_t ran;
 	uint64_t fed;
 	uint64_t answered;
 	uint64_t event_count;
+	uint64_t ordered;
+	uint64_t idle;
 };
 
 void *bench_create() {
@@ -112,10 +136,12 @@ void *bench_create() {
 	bool ok = find(bench, "clk", &bench->clk) && find(bench, "rst", &bench->rst) &&
 		find(bench, "blocks_valid", &bench->blocks_valid) &&
 		find(bench, "blocks_ready", &bench->blocks_ready) &&
-		find(bench, "steps_valid", &bench->steps_valid) &&
-		find(bench, "steps_ready", &bench->steps_ready) &&
-		find(bench, "done", &bench->done) && find(bench, "error", &bench->error);
-	if (!ok) {
+		find(bench, "done", &bench->done);
+	// Of an interpolator the steps, of a device the pins are followed.
+	bool steps = find(bench, "steps_valid", &bench->steps_valid) &&
+		find(bench, "steps_ready", &bench->steps_ready) && find(bench, "error", &bench->error);
+	bool device = find(bench, "busy", &bench->busy) && find(bench, "reason", &bench->reason);
+	if (!ok || steps == device) {
 		cxxrtl_destroy(bench->design);
 		delete bench;
 		return nullptr;
@@ -129,14 +155,15 @@ void bench_destroy(void *handle) {
 	delete bench;
 }
 
-// kind: 0 field of a block, 1 field of a step, 2 watched. Answers 0 when there is no such port.
+// kind: 0 field of a block, 1 field of a step, 2 watched, 3 control. Answers 0 when there is no such port.
 int bench_add(void *handle, int kind, const char *name, int is_signed) {
 	Bench *bench = static_cast<Bench *>(handle);
 	Port port;
 	if (!find(bench, name, &port))
 		return 0;
 	port.is_signed = is_signed != 0;
-	std::vector<Port> *lists[] = {&bench->block_fields, &bench->step_fields, &bench->watched};
+	std::vector<Port> *lists[] = {
+		&bench->block_fields, &bench->step_fields, &bench->watched, &bench->controls};
 	lists[kind]->push_back(port);
 	return 1;
 }
@@ -149,12 +176,19 @@ void bench_run(void *handle, Request *request) {
 	Bench &bench = *static_cast<Bench *>(handle);
 	Request &r = *request;
 	const size_t fields = bench.block_fields.size();
-	r.ran = r.fed = r.answered = r.event_count = 0;
+	const bool device = bench.steps_valid.curr == nullptr;
+	r.ran = r.fed = r.answered = r.event_count = r.ordered = r.idle = 0;
 	int64_t *watch = r.watch;
 	int64_t *event = r.events;
 	while (r.ran < r.clocks && (r.events == nullptr || r.event_count < r.event_room)) {
 		if (r.until_answered && r.answered >= r.until_answered)
 			break;
+		for (; r.ordered < r.order_count; r.ordered++) {
+			const int64_t *order = r.orders + 3 * r.ordered;
+			if (uint64_t(order[0]) > bench.clock)
+				break;
+			bench.controls[order[1]].set(order[2]);
+		}
 		if (!bench.offering && r.fed < r.block_count &&
 				(!r.gap_below || draw(r.seed, bench.clock, 1) >= r.gap_below)) {
 			for (size_t k = 0; k < fields; k++)
@@ -167,7 +201,7 @@ void bench_run(void *handle, Request *request) {
 		bench.settle();
 
 		bool accepted = bench.offering && bench.blocks_ready.get();
-		bool taken = ready && bench.steps_valid.get();
+		bool taken = device ? bench.pins_changed() : ready && bench.steps_valid.get();
 		int64_t done = bench.done.get(), error = bench.error.get();
 		if (event != nullptr && (accepted || taken || done || error)) {
 			*event++ = int64_t(bench.clock);
@@ -187,9 +221,13 @@ void bench_run(void *handle, Request *request) {
 			r.fed++;
 		}
 		r.answered += (done != 0) + (error != 0);
+		bool fed = r.fed == r.block_count && !accepted;
+		r.idle = !bench.busy.get() && (fed || bench.reason.get());
 		bench.edge();
 		bench.clock++;
 		r.ran++;
+		if (r.until_idle && r.idle)
+			break;
 	}
 }
 

@@ -22,7 +22,7 @@ from amaranth.back import cxxrtl, rtlil
 from discreta.hdl.contract import Part
 from discreta.hdl.plain import PlainPorts
 from discreta.sim.stalls import NO_STALLS, Stalls
-from discreta.sim.stretch import EVENT_COLUMNS, Stretch
+from discreta.sim.stretch import EVENT_COLUMNS, NO_ORDERS, Stretch
 
 __all__ = ["CompiledModel", "compiler"]
 
@@ -48,10 +48,15 @@ class _Request(ctypes.Structure):
         ("events", ctypes.c_void_p),
         ("event_room", ctypes.c_uint64),
         ("watch", ctypes.c_void_p),
+        ("orders", ctypes.c_void_p),
+        ("order_count", ctypes.c_uint64),
+        ("until_idle", ctypes.c_uint64),
         ("ran", ctypes.c_uint64),
         ("fed", ctypes.c_uint64),
         ("answered", ctypes.c_uint64),
         ("event_count", ctypes.c_uint64),
+        ("ordered", ctypes.c_uint64),
+        ("idle", ctypes.c_uint64),
     )
 
 
@@ -118,12 +123,15 @@ class CompiledModel:
         self.watch = watch
         self.block_fields = top.block_fields
         self.step_fields = top.step_fields
+        self.control_fields = top.control_fields
         self._call = ctypes.CDLL(str(_library(top)))
         self._call.bench_create.restype = ctypes.c_void_p
         ports = top.inputs | top.outputs
         self._ports = [
             (kind, name.encode(), int(ports[name].shape().signed))
-            for kind, names in enumerate((self.block_fields, self.step_fields, watch))
+            for kind, names in enumerate(
+                (self.block_fields, self.step_fields, watch, self.control_fields)
+            )
             for name in names
         ]
         self._bench = self._create()
@@ -157,6 +165,8 @@ class CompiledModel:
         until_answered: int = 0,
         stalls: Stalls = NO_STALLS,
         event_room: int = 0,
+        orders: np.ndarray = NO_ORDERS,
+        until_idle: bool = False,
     ) -> Stretch:
         """Run a stretch of clocks from where the model stands.
 
@@ -172,7 +182,13 @@ class CompiledModel:
             When steps are not taken and blocks not offered.
         event_room : int
             Stop when this many events have been recorded; 0: record none.
+        orders : array of int64, shape (orders, 3)
+            What is still to be set of the controls, in the order of time: from which clock after
+            reset on, which of ``control_fields``, and its value. They are 0 from reset on.
+        until_idle : bool
+            Stop when a device is not busy and has taken all blocks, or has stopped.
         """
+        orders = np.ascontiguousarray(orders, dtype=np.int64)
         blocks = np.ascontiguousarray(blocks, dtype=np.int64)
         assert blocks.shape[1:] == (len(self.block_fields),)
         events = np.empty((event_room, len(EVENT_COLUMNS) + len(self.step_fields)), dtype=np.int64)
@@ -188,12 +204,17 @@ class CompiledModel:
             events=events.ctypes.data if event_room else None,
             event_room=event_room,
             watch=watch.ctypes.data if self.watch else None,
+            orders=orders.ctypes.data,
+            order_count=len(orders),
+            until_idle=until_idle,
         )
         self._call.bench_run(ctypes.c_void_p(self._bench), ctypes.byref(request))
         return Stretch(
             ran=request.ran,
             fed=request.fed,
             answered=request.answered,
+            ordered=request.ordered,
+            idle=bool(request.idle),
             events=events[: request.event_count],
             watch=watch[: request.ran],
         )

@@ -29,17 +29,21 @@ _DOTS = 400
 _TITLE = 56
 
 
-def picture_format(name: str) -> str:
-    """Give the ending of a picture's name, which says its format.
+def picture_format(option: str, name: str | None) -> str:
+    """Give the ending of a picture's name, which says its format; "" without one.
+
+    ``option`` is what asks for the picture.
 
     Raises
     ------
     BadInputError
         There is no such format.
     """
+    if name is None:
+        return ""
     ending = Path(name).suffix.lower()
     if ending not in FORMATS:
-        raise BadInputError(f"--plot {name}: choose a name that ends in {' or '.join(FORMATS)}")
+        raise BadInputError(f"{option} {name}: choose a name that ends in {' or '.join(FORMATS)}")
     return ending
 
 

@@ -20,6 +20,7 @@ from discreta.sim.carrier import (
     mean_increments,
 )
 from discreta.sim.curves import Curve
+from discreta.sim.machine import Drive, Machine, Trail, pace_limit
 from discreta.sim.methods import METHODS, Method
 from discreta.sim.outputs import Outputs
 from discreta.sim.pace import Pace
@@ -47,10 +48,16 @@ def run(
     reads: Iterable[str] = (),
     speed: Fraction | None = None,
     period: int | None = None,
+    drive: Drive | None = None,
+    plotter: str | None = None,
+    screen: str | None = None,
     progress: Callable[[int, int], object] | None = None,
     **choices: Any,
 ) -> dict[str, Any]:
     """Run a curve from reset, every step taken at once, and give the summary.
+
+    With ``drive`` the whole device runs it, too: what leaves its pins must be the same points in
+    the same order. Trace and waveform are those of the device then.
 
     Parameters
     ----------
@@ -73,6 +80,11 @@ def run(
         Of a method on a carrier: F > 0, in steps of path per clock; None: 1/10.
     period : int or None
         Of such a method: T, in clocks; None: 200.
+    drive : Drive or None
+        Speed, acceleration and pulses of the whole device; None: the interpolator runs alone.
+    plotter, screen : str or None
+        Files for what a virtual machine draws that sees the device's pins: with a pen, and on the
+        exercise's screen.
     progress : callable or None
         Called with the clocks run and the most there can be; the first time when every file has its
         place.
@@ -104,6 +116,11 @@ def run(
         raise BadInputError(
             f"--{name} is no option of {method.name}, which has no carrier: leave it out"
         )
+    if drive is not None and method.timed:
+        raise BadInputError(
+            f"method {method.name} has a timing of its own and does not run on the device: choose "
+            f"another, or leave out --feed, --accel, --pulse, --plotter and --screen"
+        )
     curve.check(width)
     if vcd is not None and (vcd == "-" or Path(vcd).is_char_device() or Path(vcd).is_fifo()):
         raise BadInputError("--vcd needs a file: its .gtkw view goes beside it")
@@ -115,7 +132,11 @@ def run(
         engine = "pysim" if vcd else default_engine()
     elif engine == "compiled" and default_engine() != "compiled":
         raise BadInputError("--engine compiled needs a C++ compiler: install one or use pysim")
-    kind = picture_format(plot) if plot is not None else ""
+    kind = picture_format("--plot", plot)
+    plotter_kind, screen_kind = (
+        picture_format("--plotter", plotter),
+        picture_format("--screen", screen),
+    )
 
     golden = method.model(width, curve.axes, **choices)
     blocks = _timed(curve, golden, width, speed, period) if method.timed else curve.blocks
@@ -123,17 +144,20 @@ def run(
     contour, pace = curve.contour(), None if method.timed else Pace()
     contour.done_ends = method.timed and not method.per_period
     picture = PathPlot(curve, periods=method.per_period)
-    steps, here = 0, curve.start[None]
+    steps, here, trail = 0, curve.start[None], Trail(curve.start)
+    pace_at_most = 0 if drive is None else pace_limit(curve, drive, limit)
     with Outputs(reads) as outputs:
         trace_file = outputs.open(trace) if trace is not None else None
         json_file = outputs.open(summary_file) if summary_file is not None else None
         plot_part = outputs.place(plot) if plot is not None else None
+        plotter_part = outputs.place(plotter) if plotter is not None else None
+        screen_part = outputs.place(screen) if screen is not None else None
         vcd_part = outputs.place(vcd) if vcd is not None else None
         view = outputs.open(str(Path(vcd).with_suffix(".gtkw"))) if vcd is not None else None
         vcd_file = outputs.write(vcd_part) if vcd_part else None
         core = method.core(width, curve.axes, **choices)
         if progress:
-            progress(0, limit)
+            progress(0, limit + pace_at_most)
         rows = csv.writer(trace_file, lineterminator="\n") if trace_file else None
         if rows:
             rows.writerow(["clock", *AXIS_LETTERS[: curve.axes]])
@@ -145,7 +169,7 @@ def run(
             limit=limit,
             engine=engine,
             watch=("reg_running",) if pace else (),
-            vcd=vcd_file,
+            vcd=vcd_file if drive is None else None,
         )
         for stretch in stretches:
             when, reached, errors = contour.follow(stretch)
@@ -154,13 +178,28 @@ def run(
             if len(reached):
                 moves = np.diff(reached, axis=0, prepend=here)
                 steps, here = steps + int(np.abs(moves).max(axis=1).sum()), reached[-1:]
-            if rows:
+            trail.follow(reached)
+            if rows and drive is None:
                 rows.writerows(np.column_stack([when, reached]).tolist())
             if plot_part:
                 picture.follow(reached, errors)
             clocks += stretch.ran
             if progress:
-                progress(clocks, limit)
+                progress(clocks, limit + pace_at_most)
+        pictured = f"{method.name}, {width} bits"
+        machine: Machine | None = None
+        if drive is not None:
+            machine = Machine(curve, core, drive, trail)
+            for when, reached in machine.run(limit=pace_at_most, engine=engine, vcd=vcd_file):
+                if rows:
+                    rows.writerows(np.column_stack([when, reached]).tolist())
+                if progress:
+                    progress(clocks + machine.clocks, limit + pace_at_most)
+            title = f"{pictured}, F = {float(drive.programmed):g}"
+            if plotter_part:
+                machine.pen.draw(plotter_part, plotter_kind, title)
+            if screen_part:
+                machine.screen.save(screen_part, screen_kind)
         bound = method.bound(golden)
         summary = {
             "method": method.name,
@@ -175,14 +214,17 @@ def run(
             "largest error at": list(contour.error_at),
             **({} if bound is None else {"error bound": round(bound, 4)}),
             **curve.facts(contour, pace),
-            "end point reached": contour.ends_reached == len(blocks),
+            **({} if machine is None else machine.facts()),
+            "end point reached": contour.ends_reached == len(blocks)
+            and (machine is None or machine.good),
         }
         if vcd and vcd_file and vcd_part and view:
             vcd_file.close()
-            write_view(view, vcd_part, Path(vcd).name, core)
+            shown = core if machine is None else machine.device
+            write_view(view, vcd_part, Path(vcd).name, shown)
         if plot_part:
             chosen = say_choices({name: core.parameters[name] for name in method.choices})
-            picture.save(plot_part, kind, f"{method.name}, {width} bits, {chosen}")
+            picture.save(plot_part, kind, f"{pictured}, {chosen}")
         if json_file:
             json.dump(summary, json_file, indent=2)
             json_file.write("\n")

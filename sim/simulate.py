@@ -1,6 +1,6 @@
 """Runs blocks through the RTL, on either engine, from reset to the last answer."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import IO
 
 import numpy as np
@@ -37,6 +37,7 @@ def simulate(
     stalls: Stalls = NO_STALLS,
     watch: tuple[str, ...] = (),
     vcd: IO[str] | None = None,
+    controls: Mapping[str, int] | None = None,
 ) -> Iterator[Stretch]:
     """Run blocks one behind the other and give what happened, stretch by stretch.
 
@@ -55,6 +56,9 @@ def simulate(
         Ports, or registers prefixed with ``reg_``, to record at every clock.
     vcd : file or None
         Where pysim writes a waveform.
+    controls : dict of str to int or None
+        Of a device the values of its inputs beside the blocks, those left out being 0. It is run
+        until it is idle.
 
     Raises
     ------
@@ -67,7 +71,13 @@ def simulate(
         model = CompiledModel(core, watch=watch)
     try:
         answered = fed = clocks = 0
-        while answered < len(blocks):
+        idle = False
+        names = model.control_fields
+        orders = np.array(
+            [[0, names.index(name), value] for name, value in (controls or {}).items()],
+            dtype=np.int64,
+        ).reshape(-1, 3)
+        while not idle if controls is not None else answered < len(blocks):
             if clocks >= limit:
                 raise DeadCoreError(
                     f"{answered} of {len(blocks)} blocks are answered after {clocks} clocks, "
@@ -76,10 +86,15 @@ def simulate(
             stretch = model.run(
                 blocks[fed : fed + STRETCH],
                 min(STRETCH, limit - clocks),
-                until_answered=len(blocks) - answered,
+                until_answered=0 if controls is not None else len(blocks) - answered,
                 stalls=stalls,
                 event_room=STRETCH,
+                orders=orders,
+                until_idle=controls is not None,
             )
+            orders = orders[stretch.ordered :]
+            # A device that has not been offered all blocks yet only seems to have them.
+            idle = stretch.idle and (fed + stretch.fed == len(blocks) or stretch.fed == 0)
             clocks += stretch.ran
             fed += stretch.fed
             answered += stretch.answered

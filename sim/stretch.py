@@ -4,10 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["EVENT_COLUMNS", "Stretch"]
+__all__ = ["EVENT_COLUMNS", "NO_ORDERS", "Stretch"]
 
 #: First columns of the events; the fields of the step follow.
 EVENT_COLUMNS = ("clock", "accepted", "done", "error", "taken")
+
+
+#: Controls that are never set.
+NO_ORDERS = np.empty((0, 3), dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -22,9 +26,14 @@ class Stretch:
         Blocks accepted.
     answered : int
         Blocks answered by ``done`` or ``error``.
+    ordered : int
+        Controls set.
+    idle : bool
+        Of a device: it is not busy at the end, and has taken all blocks or has stopped.
     events : array of int64, shape (events, 5 + step fields)
         A row for every clock in which a block was accepted or answered or a step was taken:
-        :data:`EVENT_COLUMNS`, then the fields of the step. Clocks are counted from reset.
+        :data:`EVENT_COLUMNS`, then the fields of the step. Clocks are counted from reset. Of a
+        device ``taken`` means that a pin has changed, and the pins follow.
     watch : array of int64, shape (clocks, watched signals)
         The watched signals at every clock, before its edge.
     """
@@ -32,5 +41,7 @@ class Stretch:
     ran: int
     fed: int
     answered: int
+    ordered: int
+    idle: bool
     events: np.ndarray
     watch: np.ndarray

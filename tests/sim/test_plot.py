@@ -258,9 +258,10 @@ def test_of_many_periods_the_mean_is_drawn(tmp_path):
 
 
 def test_names_of_pictures():
-    assert picture_format("a/b.c.SVG") == ".svg"
-    assert picture_format("x.png") == ".png"
+    assert picture_format("--plot", "a/b.c.SVG") == ".svg"
+    assert picture_format("--plot", "x.png") == ".png"
+    assert picture_format("--plot", None) == ""
     for name in ("x.pdf", "x", "-", ".svg"):
         message = f"^--plot {re.escape(name)}: choose a name that ends in .png or .svg$"
         with pytest.raises(BadInputError, match=message):
-            picture_format(name)
+            picture_format("--plot", name)
