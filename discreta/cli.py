@@ -41,7 +41,7 @@ from discreta.sim.compiled import compiler
 from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
 from discreta.sim.curves import Arc, Conic, Curve, Polyline
 from discreta.sim.machine import Drive
-from discreta.sim.methods import METHODS, Method
+from discreta.sim.methods import METHODS, Design, Method
 from discreta.sim.outputs import Outputs
 from discreta.sim.plotter import PulseTiming
 from discreta.sim.points import (
@@ -129,16 +129,25 @@ class _Speed(click.ParamType):
 
 
 class _MethodName(click.ParamType):
-    """The name of a method."""
+    """The name of a method, or of a unit of the device, too."""
 
     name = "METHOD"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Method:
-        if isinstance(value, Method):
+    def __init__(self, *, units: bool = False):
+        self._units = units
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Design:
+        if isinstance(value, Design):
             return value
-        if value not in METHODS:
-            self.fail(f"there is no method {value!r}: choose {' or '.join(METHODS)}", param, ctx)
-        return METHODS[value]
+        there_are: dict[str, Design] = dict(METHODS)
+        if self._units:
+            # Not needed by the commands that run a method alone.
+            from discreta.sim.units import UNITS
+
+            there_are |= UNITS
+        if value not in there_are:
+            self.fail(f"there is no method {value!r}: choose {' or '.join(there_are)}", param, ctx)
+        return there_are[value]
 
 
 class _Number(click.ParamType):
@@ -355,7 +364,7 @@ def _run_options(method: str, width: Callable = _width) -> Callable:
     )
 
 
-def _chosen(method: Method, setting: str, given: dict[str, Any]) -> dict[str, Any]:
+def _chosen(method: Design, setting: str, given: dict[str, Any]) -> dict[str, Any]:
     """Give a method's choices: those of a setting, and in their place what is given.
 
     Raises
@@ -383,7 +392,7 @@ def _chosen(method: Method, setting: str, given: dict[str, Any]) -> dict[str, An
     return choices
 
 
-def _check_width(method: Method, width: int) -> None:
+def _check_width(method: Design, width: int) -> None:
     """Raise :class:`BadInputError` for a width that a method's devices do not have."""
     if width > method.max_width:
         raise BadInputError(
@@ -399,7 +408,7 @@ _one_setting = click.option(
 )
 
 
-def _variants(method: Method, setting: str | None) -> list[dict[str, Any]]:
+def _variants(method: Design, setting: str | None) -> list[dict[str, Any]]:
     """Give the variants of a method, or of them the one that is a setting."""
     if setting is None:
         return method.variants()
@@ -699,8 +708,8 @@ def _out() -> Console:
     return Console(highlight=False, width=None if sys.stdout.isatty() else 250)
 
 
-@cli.command()
-@click.argument("method", type=_MethodName())
+@cli.command(short_help="Write a method or the device as Verilog-2005 with plain ports.")
+@click.argument("method", type=_MethodName(units=True))
 @_width
 @click.option(
     "--axes",
@@ -711,8 +720,11 @@ def _out() -> Console:
 )
 @_setting_options
 @click.option("--output", metavar="FILE.v", default="-", help="[default: standard output]")
-def verilog(method: Method, width: int, axes: int, setting: str, output: str, **given: Any) -> None:
-    """Write a method as Verilog-2005 with plain ports.
+def verilog(method: Design, width: int, axes: int, setting: str, output: str, **given: Any) -> None:
+    """Write a method as Verilog-2005 with plain ports, or the whole device, or a unit of it.
+
+    These are device (lines, arcs and conics from one queue to the pins of the motor drivers), feed
+    and pulse.
 
     Example: discreta verilog linear --width 16 --output linear.v
     """
@@ -727,11 +739,15 @@ def verilog(method: Method, width: int, axes: int, setting: str, output: str, **
 
 
 @cli.command(short_help="Prove that the RTL equals its model and keeps its promises.")
-@click.argument("methods", type=_MethodName(), nargs=-1, required=True, metavar="METHOD...")
+@click.argument(
+    "methods", type=_MethodName(units=True), nargs=-1, required=True, metavar="METHOD..."
+)
 @_width
 @_one_setting
-def prove(methods: tuple[Method, ...], width: int, setting: str | None) -> None:
+def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
     """Prove a method: RTL = golden model, and its promises, for every block of a width.
+
+    Or a unit of the device: feed, pulse, or the device itself, with a queue of one block.
 
     Every combination of the method's options is proven, in the plane; what they share is proven
     once. What is marked as checked was run in every case there is, which it names. Exits 1 when

@@ -167,7 +167,7 @@ class Device(Part):
         }
         # The device has an input of that name.
         self.registers["pulse_hold"] = self.registers.pop("hold")
-        self.intermediates = {"taken": self.queue.taken}
+        self.intermediates = {"taken": self.queue.taken, **self.feed.intermediates}
         for kind, part in self.interpolators.items():
             self.diagram |= {f"{kind}: {title}": group for title, group in part.diagram.items()}
             self.registers |= {f"{kind}_{name}": value for name, value in part.registers.items()}

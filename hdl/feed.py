@@ -64,17 +64,19 @@ class FeedUnit(Part):
         r = min(v, target), or v itself where v ≥ target + a: it is still falling
 
     B is the way that braking from v takes: it adds up while v climbs and is used up, by just the
-    same numbers, while it falls; where v is 0, so is B. So r exceeds the target by less than a, but
-    where it falls to a new one. ``to_go`` is the path left to the end of the chain of blocks:
-    ``begins`` loads it with ``ahead``, a step takes off its own pause, and 1 always remains. So the
-    speed is a trapezoid over the path, or a triangle; the last step, like the first, is made at
-    √(2a) at most. Both counts are hints: whatever they are, every step leaves.
+    same numbers, while it falls; where v is 0, so is B. v may exceed the target by less than a, and
+    so may r in the first clock of a fall to a lower one. ``to_go`` is the path left to the end of
+    the chain of blocks: ``begins`` loads it with ``ahead``, a step takes off its own pause, and 1
+    always remains. So the speed is a trapezoid over the path, or a triangle. The first step leaves
+    at a; the last one at √(2a·(2 + 3V)) + a at most, as the path left is known in whole steps and
+    braking from V begins 3 clocks late. Both counts are hints: whatever they are, every step
+    leaves.
 
     Pauses: a step on one axis is followed by a pause of 1 at the rate r, one on k axes by one of
     ``pauses``\\[k − 1\\]/256, which is √k. ``debt`` is what is left of it: a step that leaves adds
-    its pause, every clock takes off r, and the next one is permitted when nothing is left. The
-    fraction is kept, so that no clock is lost in the mean; time in which no step was there is not
-    made up.
+    its pause, every clock takes off r, and the next one is permitted when nothing is left. A single
+    step that leaves in the middle of a pause puts its own in its place. The fraction is kept, so
+    that no clock is lost in the mean; time in which no step was there is not made up.
     With ``pairing`` a step on other axes than the ones before it belongs to the same move: x and
     then y is a diagonal in two halves, and the second half adds √2 − 1 only. Without it (as in the
     exercise) an interpolator that puts out x and y one after the other is up to 29 % too slow.
@@ -202,9 +204,7 @@ class FeedUnit(Part):
         factor = Signal(OVERRIDE_BITS)
         significand = Signal(_MANTISSA_BITS + 1)
         shifted = Signal(_PRODUCT_BITS + RATE_BITS - _MANTISSA_BITS - 7)
-        rows = [
-            Mux(factor[bit], significand << bit, 0) for bit in range(MAX_OVERRIDE.bit_length())
-        ]
+        rows = [Mux(factor[bit], significand << bit, 0) for bit in range(MAX_OVERRIDE.bit_length())]
         total = rows[0]
         for row, partial in zip(rows[1:], self.intermediates.values(), strict=True):
             m.d.comb += partial.eq(total + row)

@@ -1,5 +1,7 @@
 """The block queue: blocks of any kind, one behind the other, through the right interpolator."""
 
+from typing import Any
+
 from amaranth import Cat, Module, Mux, ResetInserter, Signal
 from amaranth.hdl import Value, signed
 from amaranth.lib import data, enum, stream
@@ -48,7 +50,7 @@ class BlockKind(enum.Enum, shape=2):  # pyright: ignore[reportGeneralTypeIssues,
 
 
 #: The kinds that move, by the names of their interpolators.
-KINDS = {"line": BlockKind.LINE, "arc": BlockKind.ARC, "conic": BlockKind.CONIC}
+KINDS: dict[str, Any] = {"line": BlockKind.LINE, "arc": BlockKind.ARC, "conic": BlockKind.CONIC}
 
 
 class StopReason(enum.Enum, shape=3):  # pyright: ignore[reportGeneralTypeIssues, reportCallIssue]

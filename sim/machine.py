@@ -111,7 +111,7 @@ def device_blocks(
     for index, name in enumerate(fields):
         blocks[1:, index] = columns[name]
     letters = AXIS_LETTERS[: curve.axes]
-    place = {"blocks_kind": BlockKind.PLACE.value}
+    place = {"blocks_kind": BlockKind.__members__["PLACE"].value}
     place |= {f"blocks_end_{a}": value for a, value in zip(letters, curve.start, strict=True)}
     for name, value in place.items():
         blocks[0, fields.index(name)] = value

@@ -33,23 +33,18 @@ from discreta.sim.golden.two_stage import TwoStage as GoldenTwoStage
 from discreta.sim.golden.two_stage import two_stage_circular as golden_two_stage_circular
 from discreta.sim.golden.two_stage import two_stage_linear as golden_two_stage_linear
 
-__all__ = ["METHODS", "Method"]
+__all__ = ["METHODS", "Design", "Method"]
 
 
-@dataclass(frozen=True)
-class Method:
-    """A method of interpolation.
+@dataclass(frozen=True, kw_only=True)
+class Design:
+    """Something with an RTL and a golden model, to be converted to Verilog and proven.
 
     Attributes
     ----------
     name : str
-    curve : str
-        What its blocks are: ``"line"``, ``"arc"`` or ``"conic"``.
     summary : str
-        What it draws and how, in a few words.
-    error_bound : str
-        Largest distance from the true curve in the plane, in steps.
-    clocks_per_step : str
+        What it does and how, in a few words.
     device, golden : callable
         Make the RTL and the golden model from the same parameters; see :meth:`core`.
     axes : tuple of int
@@ -60,18 +55,8 @@ class Method:
     settings : dict of str to dict
         Values for all choices, by name: ``"default"``, and ``"lecture"`` for the machine of the
         documents.
-    clocks : callable
-        ``clocks(golden, blocks)``: the most clocks that each block takes from its acceptance to its
-        last step, alone and without stalls; ``blocks`` has shape (blocks, block fields).
-    bound : callable
-        ``bound(golden)``: the proven error bound of one model, in steps; None without one.
     max_width : int
         Its devices have 4 to so many bits.
-    timed : bool
-        It runs on a constant carrier: its blocks end with the fields ``periods`` and ``period``,
-        and its golden models know their ``least_period``.
-    per_period : bool
-        What it puts out are the steps of a whole period, any number an axis.
     differs : callable
         ``differs(choices)``: whether this combination of choices makes a machine that no other one
         makes, to be surveyed and proven.
@@ -80,20 +65,13 @@ class Method:
     """
 
     name: str
-    curve: str
     summary: str
-    error_bound: str
-    clocks_per_step: str
     device: Callable[..., Part]
     golden: Callable[..., Any]
-    axes: tuple[int, ...]
+    axes: tuple[int, ...] = (2,)
     choices: dict[str, tuple[Any, ...]]
     settings: dict[str, dict[str, Any]]
-    clocks: Callable[[Any, np.ndarray], np.ndarray]
-    bound: Callable[[Any], float | None]
     max_width: int = MAX_WIDTH
-    timed: bool = False
-    per_period: bool = False
     differs: Callable[[dict[str, Any]], bool] = lambda _: True
     proofs: str | None = None
 
@@ -106,11 +84,11 @@ class Method:
         return self.golden(width, **self._axes(axes), **choices)
 
     def _axes(self, axes: int) -> dict[str, int]:
-        """Name the number of axes for a method that leaves a choice."""
+        """Name the number of axes for a design that leaves a choice."""
         return {"axes": axes} if len(self.axes) > 1 else {}
 
     def promises(self, golden: Any) -> list:
-        """Give what is proven of the method beyond its equality to the golden model."""
+        """Give what is proven of it beyond its equality to the golden model."""
         return self.proof_module().promises(golden)
 
     def proof_module(self) -> Any:
@@ -125,6 +103,38 @@ class Method:
             for values in product(*self.choices.values())
         ]
         return [choices for choices in combinations if self.differs(choices)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Method(Design):
+    """A method of interpolation.
+
+    Attributes
+    ----------
+    curve : str
+        What its blocks are: ``"line"``, ``"arc"`` or ``"conic"``.
+    error_bound : str
+        Largest distance from the true curve in the plane, in steps.
+    clocks_per_step : str
+    clocks : callable
+        ``clocks(golden, blocks)``: the most clocks that each block takes from its acceptance to its
+        last step, alone and without stalls; ``blocks`` has shape (blocks, block fields).
+    bound : callable
+        ``bound(golden)``: the proven error bound of one model, in steps; None without one.
+    timed : bool
+        It runs on a constant carrier: its blocks end with the fields ``periods`` and ``period``,
+        and its golden models know their ``least_period``.
+    per_period : bool
+        What it puts out are the steps of a whole period, any number an axis.
+    """
+
+    curve: str
+    error_bound: str
+    clocks_per_step: str
+    clocks: Callable[[Any, np.ndarray], np.ndarray]
+    bound: Callable[[Any], float | None]
+    timed: bool = False
+    per_period: bool = False
 
 
 def _linear_clocks(golden: GoldenLinear, blocks: np.ndarray) -> np.ndarray:

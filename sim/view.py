@@ -14,6 +14,9 @@ __all__ = ["write_view"]
 #: Where pysim puts the interpolator.
 _CORE = ["bench", "top", "core"]
 
+#: Beginnings of the names of the ports that are shown.
+_STREAMS = ("blocks", "steps", "pins", "busy", "done", "error", "reason")
+
 #: Ends of the names of signed ports: coordinates and steps.
 _AXES = [f"_{letter}" for letter in AXIS_LETTERS]
 
@@ -36,7 +39,6 @@ def write_view(view: IO[str], vcd: Path, shown_as: str, core: Part) -> None:
     core : Part
         The interpolator, with its ``diagram``.
     """
-    names = _inside(vcd)
     ports = _ports(vcd)
     save = GTKWSave(view)
     save.dumpfile(shown_as, abspath=False)
@@ -55,7 +57,10 @@ def write_view(view: IO[str], vcd: Path, shown_as: str, core: Part) -> None:
                 )
                 for _ in range(_CURVE_ROWS):
                     save.blank(analog_extend=True)
+    interpolators = getattr(core, "interpolators", {})
     for title, registers in core.diagram.items():
+        kind = title.partition(": ")[0]
+        names = _inside(vcd, [*_CORE, kind] if kind in interpolators else _CORE)
         with save.group(title):
             for register in registers:
                 datafmt = "signed" if register.shape().signed else "dec"
@@ -63,7 +68,7 @@ def write_view(view: IO[str], vcd: Path, shown_as: str, core: Part) -> None:
     with save.group("blocks and steps"):
         save.trace(ports["clk"], alias="clk")
         for port in ports:
-            if port.split("_")[0] in ("blocks", "steps", "busy", "done", "error"):
+            if port.split("_")[0] in _STREAMS:
                 datafmt = "signed" if port[-2:] in _AXES else "dec"
                 save.trace(ports[port], alias=port, datafmt=datafmt)
 
@@ -85,9 +90,9 @@ def _variables(vcd: Path) -> Iterator[tuple[list[str], str, str]]:
                 return
 
 
-def _inside(vcd: Path) -> dict[str, str]:
-    """Give every variable of the interpolator by its name; of several, the one nearest its top."""
-    inside = [variable for variable in _variables(vcd) if variable[0][:3] == _CORE]
+def _inside(vcd: Path, part: list[str]) -> dict[str, str]:
+    """Give every variable of a part by its name; of several, the one nearest its top."""
+    inside = [variable for variable in _variables(vcd) if variable[0][: len(part)] == part]
     inside.sort(key=lambda variable: -len(variable[0]))
     return {name: path for _, name, path in inside}
 

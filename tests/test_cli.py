@@ -29,10 +29,12 @@ from discreta.hdl.circular import Circular
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import ErrorCode, Part, point_layout, step_layout
 from discreta.hdl.linear import Linear
+from discreta.hdl.pulse import PulseUnit
 from discreta.hdl.quadrant import line_block_layout
 from discreta.hdl.verilog import verilog
 from discreta.sim.methods import METHODS
 from discreta.sim.smt import Verdict
+from discreta.sim.units import UNITS
 from tests.arcs import arc_steps
 from tests.lines import distance, path_steps
 
@@ -861,6 +863,50 @@ BAD = {
         [*TIMED_LINE, "--width", "25"],
         "--width 25: carrier_linear has up to 24 bits: choose 4 to 24",
     ),
+    # The whole device
+    "no feed": (
+        [*LINE, "--feed", "0"],
+        "Invalid value for '--feed': 0 steps per clock are no speed: choose more than 0",
+    ),
+    "feed above 1": (
+        [*LINE, "--feed", "2"],
+        "the speed is 2 steps per clock: the feed unit has 2^-24 to 1; choose a slower one",
+    ),
+    "feed too small": (
+        [*LINE, "--feed", "1e-9"],
+        "the speed is 1e-9 steps per clock: the feed unit has 2^-24 to 1; choose a faster one",
+    ),
+    "acceleration too large": (
+        [*LINE, "--accel", "1"],
+        "the acceleration is 1 steps per clock²: the feed unit has 2^-48 to (1 - 2^-40)·2^-8, or 0 "
+        "for no ramp; choose a smaller one",
+    ),
+    "two timings of pulses": (
+        [*LINE, "--pulse", "1,2"],
+        "Invalid value for '--pulse': '1,2' is not a timing: give 4 whole numbers of clocks with "
+        "commas between, like 2,2,5,5",
+    ),
+    "long pulses": (
+        [*LINE, "--pulse", "5000,1,1,1"],
+        "pulse length is 5000 clocks: choose up to 4095",
+    ),
+    "short pulses": (
+        [*LINE, "--pulse=-1,1,1,1"],
+        "--pulse: pulse length is -1: choose a whole number from 0",
+    ),
+    "plotter as gif": (
+        [*LINE, "--plotter", "pen.gif"],
+        "--plotter pen.gif: choose a name that ends in .png or .svg",
+    ),
+    "screen without a kind": (
+        [*LINE, "--screen", "screen"],
+        "--screen screen: choose a name that ends in .png or .svg",
+    ),
+    "a feed on a carrier": (
+        [*TIMED_LINE, "--feed", "1"],
+        "method carrier_linear has a timing of its own and does not run on the device: choose "
+        "another, or leave out --feed, --accel, --pulse, --plotter and --screen",
+    ),
     # Methods and their options
     "method": (
         [*LINE, "--method", "circle"],
@@ -869,7 +915,7 @@ BAD = {
     "prove": (
         ["prove", "linear", "circle"],
         "Invalid value for 'METHOD...': there is no method 'circle': choose "
-        f"{' or '.join(METHODS)}",
+        f"{' or '.join([*METHODS, *UNITS])}",
     ),
     "width 3": ([*LINE, "--width", "3"], f"Invalid value for '--width': width is 3: {WIDTH}"),
     "width 33": ([*LINE, "--width", "33"], f"Invalid value for '--width': width is 33: {WIDTH}"),
@@ -1252,6 +1298,53 @@ def test_no_command_shows_what_there_is(discreta, words):
     code, out, err = discreta(*words)
     assert (code, out) == (2, "")
     assert err.startswith(f"Usage: {' '.join(['discreta', *words])} [OPTIONS] COMMAND")
+
+
+def test_a_path_on_the_whole_device(discreta):
+    """The same points as without, in order, at the programmed speed, and pictures of the pins."""
+    write_csv("path.csv", [(0, 0), (30, 10), (5, 40), (0, 0)])
+    alone = discreta("simulate", "path", "path.csv", "--trace", "alone.csv")
+    assert alone[0] == 0
+    drive = ["--feed", "1/8", "--accel", "0.001", "--pulse", "2,2,3,3", *PYSIM]
+    files = ["--trace", "pins.csv", "--plotter", "pen.svg", "--screen", "screen.png"]
+    code, _, err = discreta("simulate", "path", "path.csv", *drive, *files, "--json", "run.json")
+    assert (code, err) == (0, "")
+    summary = json.loads(Path("run.json").read_text())
+    assert summary["feed"] == 0.125
+    assert summary["acceleration"] == 0.001
+    assert summary["pulse length, space, set-up, hold"] == [2, 2, 3, 3]
+    assert summary["pulses"] == [60, 80]
+    assert summary["timing rules broken"] == 0
+    assert summary["position is the pulses"]
+    assert summary["same points from the pins"]
+    assert summary["end point reached"]
+    rows = [Path(name).read_text().splitlines() for name in ("alone.csv", "pins.csv")]
+    points = [[row.partition(",")[2] for row in part] for part in rows]
+    assert points[0] == points[1]
+    assert int(rows[1][-1].partition(",")[0]) == summary["device clocks"]
+    length = sum(hypot(x, y) for x, y in ((30, 10), (25, 30), (5, 40)))
+    assert summary["mean speed"] == pytest.approx(length / summary["device clocks"], rel=1e-4)
+    # F/a clocks more than at once, all in all; and up to 7.6 % by the octagon.
+    assert length * 8 + 125 - 50 < summary["device clocks"] < length * 8 / 0.924 + 125 + 50
+    assert Path("pen.svg").read_text().startswith("<?xml")
+    assert Path("screen.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_differs_at_the_pins_fails(discreta, monkeypatch):
+    """A device that turns a direction round is seen, and the command says so."""
+    sound = PulseUnit.elaborate
+
+    def elaborate(self, platform):
+        m = sound(self, platform)
+        m.d.comb += self.pins.x.direction.eq(~self.direction["x"])
+        return m
+
+    monkeypatch.setattr(PulseUnit, "elaborate", elaborate)
+    code, out, err = discreta(*LINE, "--feed", "1/4", *PYSIM)
+    assert (code, err) == (1, "")
+    assert re.search("^same points from the pins +no$", out, flags=re.MULTILINE)
+    assert re.search("^position is the pulses +no$", out, flags=re.MULTILINE)
+    assert re.search("^end point reached +no$", out, flags=re.MULTILINE)
 
 
 def paths(command=cli.cli, path=("discreta",)):

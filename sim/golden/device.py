@@ -155,8 +155,8 @@ class Device:
         """Give the state after one clock.
 
         ``inputs``: those of :meth:`inputs`. ``tell`` is told the values between the registers that
-        have a name, ``taken`` (a step leaves its interpolator) and those that an interpolator
-        names, behind its kind; it gives what is reckoned with instead.
+        have a name: ``taken`` (a step leaves its interpolator), those of the feed unit, and those
+        that an interpolator names, behind its kind; it gives what is reckoned with instead.
         """
         stands = negate(equal(state["reason"], 0))
         queue_inputs = self.queue_inputs(state, inputs)
@@ -184,7 +184,7 @@ class Device:
             "single": inputs["single"] & negate(state["stop_asked"]),
         }
         feed_inputs |= {f"moves_{a}": negate(equal(queue[f"steps_{a}"], 0)) for a in self.letters}
-        later, fresh = self.feed.step(state, feed_inputs), self.feed.reset()
+        later, fresh = self.feed.step(state, feed_inputs, tell), self.feed.reset()
         after |= {name: where(stands, fresh[name], later[name]) for name in fresh}
 
         pulse = self.pulse.outputs(self.pulse_state(state))

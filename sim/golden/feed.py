@@ -130,7 +130,9 @@ class FeedUnit:
         released = slower >> 13
         emptied = equal(slower, 0) | less(braking, released)
         fallen = where(emptied, 0, braking - released)
-        climbed = (braking + (v >> 13)) & (2**64 - 1)
+        climbed = braking + (v >> 13)
+        # The 65th bit, in shifts that an array has room for.
+        climbed = climbed - (climbed >> 63 >> 1 << 63 << 1)
         faster = (v + a) & (2**49 - 1)
         ramped = inputs["active"] & negate(equal(a, 0))
         rate = where(above | less(v, target), v, target)
