@@ -890,6 +890,125 @@ def survey_command(method: Method, width: int, setting: str | None, whole_degree
         raise click.exceptions.Exit(1)
 
 
+def _needs_compiler() -> None:
+    if default_engine() != "compiled":
+        raise BadInputError("this needs the compiled engine: install a C++ compiler")
+
+
+def _table(headings: tuple[str, ...], left: int = 1) -> Table:
+    """Make a table, its first columns to the left."""
+    table = Table(box=None, pad_edge=False)
+    for index, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if index < left else "right")
+    return table
+
+
+@cli.command("feed", short_help="Measure the speed along the path, and the accuracy of F.")
+def feed_command() -> None:
+    """Measure speed along the path, and how exactly F is kept, on the device's pins.
+
+    The first tables show, for lines at every whole degree and for circles, how far the speed is
+    from F in windows of 40 moves, in percent: with the device's own rule for the pauses after a
+    step, with the exercise's, and with the exercise's but for the root of 2. The last one shows
+    the error of the mean pause for speeds of every octave from 1 to 2^-24, in 2^-16. Takes a
+    minute or so. Exits 1 when F is off by more than that anywhere.
+
+    Example: discreta feed
+    """
+    from discreta.sim.speed import RULES, accuracy, along_path
+
+    _needs_compiler()
+    out = _out()
+    for rule in RULES:
+        table = _table(("curves", "windows", "slowest, %", "at", "fastest, %", "at"))
+        for row in along_path(rule):
+            slowest, fastest = f"{row.smallest:+.2f}", f"{row.largest:+.2f}"
+            table.add_row(
+                row.what, str(row.windows), slowest, row.smallest_at, fastest, row.largest_at
+            )
+        out.print(f"speed along the path, {rule.title}")
+        out.print(table)
+    table = _table(("F from", "speeds", "largest error, 2^-16", "clocks"), left=0)
+    rows = accuracy()
+    for row in rows:
+        error = f"{row.largest_error:.4f}"
+        table.add_row(f"2^-{row.octave}", str(row.speeds), error, str(row.clocks))
+    out.print("accuracy of F")
+    out.print(table)
+    if max(row.largest_error for row in rows) > 1:
+        raise click.exceptions.Exit(1)
+
+
+@cli.command("limits", short_help="Time of a step and highest speed of every method.")
+@_width
+@click.option(
+    "--clock",
+    type=click.FloatRange(0, min_open=True),
+    default=100.0,
+    show_default=True,
+    metavar="MHZ",
+    help="The device's clock, in MHz.",
+)
+def limits_command(width: int, clock: float) -> None:
+    """Time of a step and highest speed of every method, and of the whole device.
+
+    The exercise's control questions 5 and 6. Every step is taken at once; clocks are those from one
+    step to the next: the fewest, in the mean, and the most, at which the speed is kept at every
+    step. On a carrier they are those of a whole period.
+
+    Example: discreta limits --clock 100
+    """
+    from discreta.sim.speed import limits
+
+    _needs_compiler()
+    headings = ("method", "curve", "bits", "clocks", "mean", "most", "ns", "most")
+    table = _table((*headings, "steps/s in the mean", "kept"), left=2)
+    for row in limits(width, clock * 1e6):
+        speeds = [
+            "-" if speed is None else f"{speed:,.0f}" for speed in (row.mean_speed, row.kept_speed)
+        ]
+        name = f"{row.method}, a period" if row.per_period else row.method
+        clocks = (str(row.least), f"{row.mean:.2f}", str(row.most))
+        times = (f"{row.mean_ns:.1f}", f"{row.most_ns:.0f}")
+        table.add_row(name, row.curve, str(row.width), *clocks, *times, *speeds)
+    _out().print(table)
+
+
+@cli.command("stress", short_help="Run random blocks through the device and judge its pins.")
+@click.option(
+    "--blocks", type=click.IntRange(1), default=100_000, show_default=True, help="How many blocks."
+)
+@click.option("--seed", type=click.IntRange(0), default=1970, show_default=True)
+def stress_command(blocks: int, seed: int) -> None:
+    """Run random blocks of all kinds through the whole device, and judge its pins.
+
+    With random speeds, accelerations, pulses, gaps, holds, single steps, overrides, stops,
+    emergency stops and limit switches; the steps are compared with the golden models'. Exits 1 when
+    a step is lost or too many, the position is not the pulses, or a rule of timing is broken.
+
+    Example: discreta stress --blocks 1000
+    """
+    from discreta.sim.stress import stress
+
+    _needs_compiler()
+    done = 0
+    with _progress("blocks") as show:
+
+        def progress(more: int) -> None:
+            nonlocal done
+            done += more
+            show(done, blocks)
+
+        report = stress(blocks, seed=seed, progress=progress, workers=os.cpu_count() or 1)
+    table = _table(("", ""), left=1)
+    table.show_header = False
+    for name, value in report.rows():
+        table.add_row(name, value)
+    _out().print(table)
+    if not report.good:
+        raise click.exceptions.Exit(1)
+
+
 @cli.command("methods")
 def methods_command() -> None:
     """List the methods, with error bound and clocks per step.

@@ -12,6 +12,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from importlib import metadata
 from itertools import pairwise
 from math import cos, hypot, pi, sin
@@ -32,6 +33,7 @@ from discreta.hdl.linear import Linear
 from discreta.hdl.pulse import PulseUnit
 from discreta.hdl.quadrant import line_block_layout
 from discreta.hdl.verilog import verilog
+from discreta.sim import speed as speeds
 from discreta.sim.methods import METHODS
 from discreta.sim.smt import Verdict
 from discreta.sim.units import UNITS
@@ -1345,6 +1347,67 @@ def test_what_differs_at_the_pins_fails(discreta, monkeypatch):
     assert re.search("^same points from the pins +no$", out, flags=re.MULTILINE)
     assert re.search("^position is the pulses +no$", out, flags=re.MULTILINE)
     assert re.search("^end point reached +no$", out, flags=re.MULTILINE)
+
+
+@pytest.fixture
+def measured(monkeypatch):
+    """Have the measurements take a sample of each."""
+    for name in ("along_path", "accuracy", "limits"):
+        sample = {
+            "along_path": {"degrees": [0, 30, 45], "radii": [100]},
+            "accuracy": {"octaves": [0, 1, 5]},
+            "limits": {"methods": ["linear", "comparison", "carrier_linear"]},
+        }[name]
+        monkeypatch.setattr(speeds, name, partial(getattr(speeds, name), **sample))
+
+
+@pytest.mark.usefixtures("compiled_engine", "measured")
+def test_feed_prints_the_speed_along_the_path_and_the_accuracy(discreta):
+    code, out, err = discreta("feed")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert [line for line in lines if line.startswith("speed")] == [
+        f"speed along the path, {rule.title}" for rule in speeds.RULES
+    ]
+    pairing, exercise = (
+        lines[
+            begin + 2 : begin
+            + 2
+            + next(k for k, line in enumerate(lines[begin + 2 :]) if "%" in line or "speed" in line)
+        ]
+        for begin in (0, lines.index("speed along the path, 1.4 after a step on both axes"))
+    )
+    slowest = [
+        min(float(number) for row in rows for number in re.findall(r"[+-]\d+\.\d\d", row))
+        for rows in (pairing, exercise)
+    ]
+    assert slowest[0] > -7.62
+    assert slowest[1] < -20
+    assert [line.split()[0] for line in lines[-3:]] == ["2^-0", "2^-1", "2^-5"]
+
+
+@pytest.mark.usefixtures("compiled_engine", "measured")
+def test_limits_of_a_clock(discreta):
+    code, out, err = discreta("limits", "--width", "8", "--clock", "50")
+    assert (code, err) == (0, "")
+    rows = {line.split()[0].rstrip(","): line.split() for line in out.splitlines()[1:]}
+    assert rows["comparison"][3:] == ["1", "1.00", "1", "20.0", "20", "50,000,000", "50,000,000"]
+    assert float(rows["linear"][4]) > 1
+    assert rows["carrier_linear"][-2:] == ["-", "-"]
+
+
+@pytest.mark.usefixtures("compiled_engine")
+def test_a_short_stress(discreta):
+    code, out, err = discreta("stress", "--blocks", "200", "--seed", "3")
+    assert (code, err) == (0, "")
+    assert re.search("^timing rules broken +0$", out, flags=re.MULTILINE)
+
+
+def test_measurements_without_a_compiler(discreta, monkeypatch):
+    monkeypatch.setattr(cli, "default_engine", lambda: "pysim")
+    message = "discreta: this needs the compiled engine: install a C++ compiler\n"
+    for command in ("feed", "limits", "stress"):
+        assert discreta(command) == (2, "", message)
 
 
 def paths(command=cli.cli, path=("discreta",)):

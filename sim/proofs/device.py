@@ -6,6 +6,8 @@ the promises follow. Those of the feed unit, of the pulse unit and of the interp
 of each alone. A ghost value keeps history: ``given``, the emergency of the clock before.
 """
 
+from dataclasses import replace
+
 import z3
 
 from discreta.sim.golden.conic import Conic
@@ -23,7 +25,11 @@ _PREPARING = ("done", "error", "pending", "fault", "start_", "delta_", "negative
 
 def promises(golden: Device) -> list[Obligation]:
     """Give everything that is promised of the device and of its queue."""
-    return [*_Clock(golden).obligations(), *queue.promises(golden.queue)]
+    of_queue = queue.promises(golden.queue)
+    return [
+        *_Clock(golden).obligations(),
+        *(replace(promise, title=f"queue: {promise.title}") for promise in of_queue),
+    ]
 
 
 class _Clock:

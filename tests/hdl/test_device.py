@@ -303,15 +303,9 @@ def test_every_register_at_every_clock_in_pysim(kinds, seed, stalls, acceleratio
 
 
 @pytest.mark.usefixtures("compiled_engine")
-@pytest.mark.parametrize(
-    ("width", "kinds", "choices", "seed"),
-    [
-        (8, ("line", "arc"), {"pins": "quadrature", "pairing": False}, 1),
-        (6, ("line", "conic"), {}, 9),
-    ],
-    ids=str,
-)
-def test_every_register_at_every_clock_compiled(width, kinds, choices, seed):
+def test_every_register_at_every_clock_compiled():
+    width, kinds, seed = 8, ("line", "arc"), 1
+    choices: dict[str, Any] = {"pins": "quadrature", "pairing": False}
     seen, wrong = differences(
         CompiledModel,
         make(width, kinds, **choices),
@@ -322,7 +316,7 @@ def test_every_register_at_every_clock_compiled(width, kinds, choices, seed):
     )
     assert wrong == []
     reasons = set(seen["reason"].tolist())
-    assert reasons >= {0, 1, 2, 3, 4} | ({6} if "conic" in kinds else {5, 7})
+    assert reasons >= {0, 1, 2, 3, 4, 5, 7}
     assert set(seen["reg_current_kind"].tolist()) >= {CODES[kind] for kind in kinds}
 
 
@@ -423,7 +417,7 @@ def test_a_block_for_nobody_is_refused_in_its_turn(depth):
     seen = run(PysimModel, make(4, ("line",), depth), blocks, 120, calm())
     assert pulses_of(seen)[1] == [(1, 0)] * 3
     assert seen["done"].sum() == 1
-    assert seen["reason"][-1] == StopReason.KIND.value
+    assert StopReason(int(seen["reason"][-1])) is StopReason.KIND
     # Once it stands nothing is kept, and nothing more is taken.
     assert not seen["busy"][-1]
     assert not seen["blocks_ready"][-1]
@@ -463,9 +457,13 @@ def test_another_kind_follows_without_a_gap():
 
 
 def test_a_short_line_before_an_arc_waits_for_its_preparation():
-    """One step gives no time: the arc's first one comes after its 2n + 5 clocks and a few."""
+    """The arc is accepted one clock before the only step of the line leaves.
+
+    Started 2n + 5 = 21 clocks later, it takes one for the half increment; 512 + 4·136 is the first
+    sum beyond M = 1024, in clock 26, and the step leaves in 27: 26 after that of the line.
+    """
     clocks = edges_of([line(16, 0), line(17, 0), arc(0, 17)])
-    assert int(np.diff(clocks)[16]) > 2
+    assert np.diff(clocks)[15:17].tolist() == [2, 26]
 
 
 # Stops.
@@ -575,7 +573,7 @@ def test_hold_loses_nothing_and_single_steps_go():
 def test_stop_under_hold_with_a_single_step_that_waits():
     """It stands where it stopped: the single step does not leave after it."""
     arcs = [arc(9, 0, (0, 0))]
-    for clock in range(18, 28):
+    for clock in range(19, 26):
         orders = [*calm(), (0, "hold", 1), (clock - 2, "single", 1), (clock, "stop", 1)]
         orders += [(clock + 1, "stop", 0), (44, "clear", 0)]
         seen = run(PysimModel, make(4, ("line", "arc")), [place(9, 0), *arcs], 70, orders)

@@ -145,10 +145,11 @@ def test_clocks_of_an_empty_queue():
 
 
 def test_the_golden_model_names_kinds_and_reasons_alike():
-    assert {kind: value.value for kind, value in KINDS.items()} == CODES
-    assert BlockKind.PLACE.value == PLACE
-    assert StopReason.KIND.value == UNKNOWN
-    assert [StopReason.RANGE.value - 1, StopReason.SHARP.value - 3] == [REFUSED] * 2
+    assert {kind: BlockKind(code) for kind, code in CODES.items()} == KINDS
+    assert BlockKind(PLACE) is BlockKind.PLACE
+    assert StopReason(UNKNOWN) is StopReason.KIND
+    reasons = [StopReason(error + REFUSED) for error in (1, 2, 3)]
+    assert reasons == [StopReason.RANGE, StopReason.OFF_CURVE, StopReason.SHARP]
 
 
 @pytest.mark.parametrize("width", [4, 16])

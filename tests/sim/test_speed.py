@@ -1,0 +1,140 @@
+# amaranth: UnusedElaboratable=no
+# (A model that is found in the cache is not built again.)
+"""What is measured of the speed: against closed values, and seen to tell a bad rule."""
+
+from math import ceil, sqrt
+
+import numpy as np
+import pytest
+
+from discreta.hdl.comparison import Comparison
+from discreta.hdl.linear import Linear
+from discreta.sim import speed
+from discreta.sim.speed import (
+    DEVICE,
+    MOVES,
+    RULES,
+    Rule,
+    accuracy,
+    along_path,
+    limits,
+    move_beginnings,
+    step_clocks,
+)
+
+pytestmark = pytest.mark.usefixtures("compiled_engine")
+
+PAIRING, EXERCISE, _ = RULES
+
+#: Of the octagon with 362/256 for √2, in %.
+SLOWEST, FASTEST = -7.62, 0.03
+
+#: Short lines, so that few clocks are run; longer ones have more of the same windows.
+LENGTH = 60
+
+
+def deviation_at_45_degrees(pause):
+    """Give by how much a diagonal step is too fast, in %, with a pause in 1/256."""
+    return 100 * (256 * sqrt(2) / pause - 1)
+
+
+def test_the_default_keeps_the_speed_within_the_octagon():
+    rows = along_path(PAIRING, degrees=(0, 23, 45, 112, 200, 300), radii=(), length=LENGTH)
+    assert [row.what for row in rows] == [
+        f"lines, {first} to {first + 90} degrees" for first in (0, 90, 180, 270)
+    ]
+    for row in rows:
+        assert SLOWEST < row.smallest <= row.largest < FASTEST
+    # 23 degrees is as good as the worst there is, 22.5.
+    assert rows[0].smallest < -7.5
+    assert rows[0].largest == pytest.approx(deviation_at_45_degrees(362), abs=1e-3)
+    assert rows[0].smallest_at.startswith("line of 23 degrees, from (")
+    assert rows[0].largest_at.startswith("line of 45 degrees, from (")
+
+
+def test_the_rule_of_the_exercise_is_worse():
+    line, circle = along_path(EXERCISE, degrees=(40, 45), radii=(40,), length=LENGTH)
+    assert line.smallest < -10
+    assert line.largest == pytest.approx(deviation_at_45_degrees(358), abs=1e-3)
+    # Of a circle x and y come one after the other, and each is paid in full.
+    assert circle.what == "circles, R = 40"
+    assert circle.smallest < -20
+    assert circle.windows > 100
+
+
+def test_a_pause_that_is_too_short_is_seen():
+    (row,) = along_path(
+        Rule("too short", (256, 300), pairing=True), degrees=(0, 45), radii=(), length=LENGTH
+    )
+    assert row.smallest == pytest.approx(0, abs=1e-9)
+    assert row.largest == pytest.approx(deviation_at_45_degrees(300), abs=1e-3)
+    assert row.largest > FASTEST
+    # The first move is left out, and the last one has no end.
+    assert row.windows == sum(moves - 1 - MOVES for moves in (LENGTH, round(LENGTH / sqrt(2))))
+
+
+@pytest.mark.parametrize(
+    ("steps", "begins"),
+    [
+        ("x x x", [0, 1, 2]),
+        ("x y x y", [0, 2]),
+        ("x xy y", [0, 1, 2]),
+        ("x x y y x", [0, 1, 3]),
+        ("xy x y xy", [0, 1, 3]),
+    ],
+)
+def test_moves_begin(steps, begins):
+    moves = np.array([[axis in step for axis in "xy"] for step in steps.split()])
+    assert move_beginnings(np.where(moves, -1, 0)).tolist() == begins
+
+
+def test_speeds_are_exact(monkeypatch):
+    # One speed of an octave, in half of the clocks: one clock more or less is half of the unit.
+    monkeypatch.setattr(speed, "_MANTISSAS", ())
+    monkeypatch.setattr(speed, "_LONG", 1 << 17)
+    rows = accuracy(octaves=(9, 1, 0))
+    assert [(row.octave, row.speeds) for row in rows] == [(0, 1), (1, 1), (9, 1)]
+    for row in rows:
+        assert row.clocks >= 1 << 17
+        assert row.largest_error <= 0.5
+    assert rows[0].largest_error == 0
+
+
+def test_clocks_of_steps():
+    comparison = step_clocks(Comparison(6), np.array([[0, 0, 40, 13]]), np.array([99]))
+    assert comparison.tolist() == [1] * 52
+    # A line of 63 steps adds 63/64 a clock, 32/64 first: there is one clock without a carry.
+    axis = step_clocks(Linear(6), np.array([[0, 0, 63, 0]]), np.array([99]))
+    assert sorted(axis.tolist()) == [1] * 61 + [2]
+    # The k-th step comes when 32 + 33·t is 64·k.
+    slow = step_clocks(Linear(6), np.array([[5, 5, 5, -28]]), np.array([99]))
+    assert slow.tolist() == np.diff([ceil((64 * k - 32) / 33) for k in range(1, 34)]).tolist()
+
+
+def test_limits():
+    clock = 50e6
+    linear, line, arc = limits(4, clock, methods=("linear", DEVICE))
+    assert (linear.method, line.method, arc.method) == ("linear", DEVICE, DEVICE)
+    assert (linear.curve, line.curve, arc.curve) == ("line", "line", "arc")
+    assert (linear.least, linear.most) == (1, 2)
+    assert line.steps == linear.steps
+    # On an axis alone a pulse and its space are two clocks.
+    assert linear.mean < 1.5 < line.mean < 2
+    assert line.most >= 2
+    for row in (linear, line, arc):
+        assert row.mean_ns == pytest.approx(20 * row.mean)
+        assert row.most_ns == 20 * row.most
+        assert row.mean_speed == pytest.approx(clock / row.mean)
+        assert row.kept_speed == clock / row.most
+
+
+def test_a_period_has_no_highest_speed():
+    (row,) = limits(6, 1e6, methods=("carrier_linear",))
+    assert (row.least, row.mean, row.most) == (2, 2, 2)
+    assert row.per_period
+    assert row.mean_speed is row.kept_speed is None
+
+
+def test_a_clock_must_tick():
+    with pytest.raises(ValueError, match=r"clock_hz is 0: choose a frequency above 0"):
+        limits(8, 0)
