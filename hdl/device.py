@@ -45,9 +45,9 @@ class Device(Part):
     the switch are possible then, and any step towards it is the next ``LIMIT``.
 
     Latency: ``emergency`` in clock t: the last leading edge is visible in t + 1, ``reason`` in
-    t + 1. A step that a limit switch stops is never put out; ``reason`` follows within 3 clocks of
-    the time at which it would have been. A step that is permitted waits one clock in the pulse unit
-    at least.
+    t + 1. A step that a limit switch stops for 3 clocks is never put out, for less it may be;
+    ``reason`` follows within 3 clocks of the time at which it would have been. A step that is
+    permitted waits one clock in the pulse unit at least.
 
     Throughput: a step a clock at most, as far as interpolator, feed and pulses allow it; between
     blocks see the queue.
