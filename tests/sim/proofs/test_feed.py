@@ -59,7 +59,8 @@ class Unchecked(Golden):
         return after | self.mistake(state, inputs, after)
 
     def mistake(self, _state, _inputs, _after):
-        raise NotImplementedError
+        """Get nothing wrong."""
+        return {}
 
 
 @dataclass(frozen=True)
