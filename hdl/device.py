@@ -45,9 +45,10 @@ class Device(Part):
     the switch are possible then, and any step towards it is the next ``LIMIT``.
 
     Latency: ``emergency`` in clock t: the last leading edge is visible in t + 1, ``reason`` in
-    t + 1. A step that a limit switch stops for 3 clocks is never put out, for less it may be;
-    ``reason`` follows within 3 clocks of the time at which it would have been. A step that is
-    permitted waits one clock in the pulse unit at least.
+    t + 1. A step that waits for a limit switch is never put out, however soon the switch is
+    released; ``reason`` follows within 3 clocks of the time at which it would have been, also where
+    the refusal of the next block was told before. A step that is permitted waits one clock in the
+    pulse unit at least.
 
     Throughput: a step a clock at most, as far as interpolator, feed and pulses allow it; between
     blocks see the queue.
@@ -200,7 +201,10 @@ class Device(Part):
         m.d.comb += [
             stands.eq(reason != StopReason.NONE),
             drops.eq(
-                self.emergency | (reason == StopReason.EMERGENCY) | (reason == StopReason.LIMIT)
+                self.emergency
+                | pulse.limited
+                | (reason == StopReason.EMERGENCY)
+                | (reason == StopReason.LIMIT)
             ),
             queue.blocks.payload.eq(self.blocks.payload),
             queue.blocks.valid.eq(self.blocks.valid),
@@ -238,10 +242,10 @@ class Device(Part):
         m.d.sync += self.stop_asked.eq((self.stop | self.stop_asked) & ~stands)
         with m.If(self.emergency):
             m.d.sync += reason.eq(StopReason.EMERGENCY)
+        with m.Elif(pulse.limited & (reason != StopReason.EMERGENCY)):
+            m.d.sync += reason.eq(StopReason.LIMIT)
         with m.Elif(stands), m.If(self.clear & ~pulse.busy):
             m.d.sync += reason.eq(StopReason.NONE)
-        with m.Elif(pulse.limited):
-            m.d.sync += reason.eq(StopReason.LIMIT)
         with m.Elif(queue.refusal != StopReason.NONE):
             m.d.sync += reason.eq(queue.refusal)
         with m.Elif(self.stop_asked & feed.still & ~queue.taken & ~pulse.busy):

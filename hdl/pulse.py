@@ -61,7 +61,8 @@ class PulseUnit(Part):
     Limits: a pending step with an axis that leads towards an active limit switch waits as a whole,
     nor does any axis turn for it. The last leading edge towards a switch that becomes active in
     clock t is visible in clock t + 1. ``limited`` is 1 in a clock after one in which a step waits
-    for that; the way out is ``stop``, or the switch's release.
+    for that, and the step waits in that clock too, so that whoever is told can still drop it by
+    ``stop``; the other way out is the switch's release.
 
     Busy: a step is pending, a pulse is out, or the space behind one lasts beyond this clock. The
     timings are taken over in every clock that is not busy, and left alone in the others: a change
@@ -224,7 +225,7 @@ class PulseUnit(Part):
         free = Signal()
         m.d.comb += [
             waiting.eq(Cat(self.moves.values()).any()),
-            free.eq(waiting & ~self.stopping & ~self.blocked),
+            free.eq(waiting & ~self.stopping & ~self.blocked & ~self.limited),
             self.launch.eq(
                 free & Cat(~self.moves[a] | self.due[a] for a in self.letters).all(),
             ),

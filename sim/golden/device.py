@@ -194,7 +194,7 @@ class Device:
         pulse_inputs |= {
             "steps_valid": queue["steps_valid"],
             "load": queue["placing"],
-            "stop": emergency | equal(reason, EMERGENCY) | equal(reason, LIMIT),
+            "stop": emergency | pulse["limited"] | equal(reason, EMERGENCY) | equal(reason, LIMIT),
         }
         after |= self.pulse_named(self.pulse.step(self.pulse_state(state), pulse_inputs))
 
@@ -203,9 +203,9 @@ class Device:
         slowed = state["stop_asked"] & negate(goes_on)
         why = where(slowed, STOP, reason)
         why = where(equal(queue["refusal"], 0), why, queue["refusal"])
-        why = where(pulse["limited"], LIMIT, why)
         cleared = where(inputs["clear"] & negate(pulse["busy"]), 0, reason)
         why = where(stands, cleared, why)
+        why = where(pulse["limited"] & negate(equal(reason, EMERGENCY)), LIMIT, why)
         after["reason"] = where(emergency, EMERGENCY, why)
         after["stop_asked"] = (inputs["stop"] | state["stop_asked"]) & negate(stands)
         return after

@@ -105,7 +105,7 @@ class PulseUnit:
         """
         stopping, waiting = state["stopping"], self._waiting(state)
         blocked, launch = self._blocked(state), self._launch(state)
-        free = waiting & negate(stopping) & negate(blocked)
+        free = self._free(state)
         busy = self._busy(state)
         accept = inputs["steps_valid"] & self.outputs(state)["steps_ready"]
         after: State = {"stopping": inputs["stop"], "limited": blocked & negate(stopping)}
@@ -164,13 +164,18 @@ class PulseUnit:
             blocked = blocked | (self._moves(state, a) & switch)
         return blocked
 
+    def _free(self, state: State) -> Value:
+        """Tell whether a step waits for nothing but time; a switch keeps it a clock longer."""
+        free = self._waiting(state) & negate(state["stopping"])
+        return free & negate(self._blocked(state)) & negate(state["limited"])
+
     def _rested(self, state: State, a: str) -> Value:
         """Tell whether the space behind an axis's last pulse has passed with this clock."""
         return negate(state[f"pulse_{a}"]) & negate(less(state[f"age_{a}"], state["space"]))
 
     def _launch(self, state: State) -> Value:
         """Tell whether all pulses of the pending step begin with the next clock."""
-        launch = self._waiting(state) & negate(state["stopping"]) & negate(self._blocked(state))
+        launch = self._free(state)
         for a in self.letters:
             right = negate(state[f"direction_{a}"] ^ self._downwards(state, a))
             set_up = negate(less(state[f"direction_age_{a}"], state["setup"]))

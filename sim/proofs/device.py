@@ -92,10 +92,13 @@ class _Clock:
         reason = state["reason"]
         return {
             "given": z3.Implies(given == 1, reason == EMERGENCY),
-            "emergency": z3.Implies(reason == EMERGENCY, state["stopping"] == 1),
+            "dropped": z3.Implies(
+                z3.Or(reason == EMERGENCY, reason == LIMIT), state["stopping"] == 1
+            ),
             "limit": z3.Implies(
                 state["stopping"] == 1, z3.Or(reason == 0, reason == EMERGENCY, reason == LIMIT)
             ),
+            "limited": z3.Implies(state["limited"] == 1, self.waits(state)),
             "stop": z3.Implies(reason == STOP, z3.Not(self.waits(state))),
         } | {
             f"refusal, {slot}": z3.Or(
@@ -178,12 +181,17 @@ class _Clock:
                 | begun_anew,
             ),
             Obligation(
-                "the reason stays until it is cleared, or becomes the emergency",
+                "the reason stays until it is cleared, or becomes the emergency; that a block is "
+                "refused becomes the limit, where a switch drops the last step before it",
                 [*self.known, self.stands],
                 [
                     z3.Or(
                         self.next_reason == self.reason,
                         z3.And(self.next_reason == EMERGENCY, self.emergency),
+                        z3.And(
+                            self.next_reason == LIMIT,
+                            *(self.reason > REFUSED, state["limited"] == 1),
+                        ),
                         z3.And(self.next_reason == 0, may_clear),
                     )
                 ],
@@ -268,11 +276,16 @@ class _Clock:
                 },
             ),
             Obligation(
-                "limit: a step towards a switch that was active a clock before is not put out; it "
-                "is told in the next clock, and in the one after the device stands",
+                "limit: a step towards a switch that was active a clock before is not put out, "
+                "then or later; it is told in the next clock, and in the one after the device "
+                "stands, until it is cleared without any leading edge",
                 self.known,
                 {
-                    "no edge": z3.Implies(blocked, z3.Not(self.edge_follows)),
+                    "no edge": z3.Implies(
+                        z3.Or(blocked, state["limited"] == 1, self.reason == LIMIT),
+                        z3.Not(self.edge_follows),
+                    ),
+                    "gone": z3.Implies(self.reason == LIMIT, z3.Not(self.waits(after))),
                     "told": z3.Implies(
                         z3.And(blocked, state["stopping"] == 0), after["limited"] == 1
                     ),

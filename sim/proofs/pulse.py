@@ -84,6 +84,8 @@ class _Clock:
             )
             for a in self.letters
         )
+        #: The switch keeps the step that waits, or kept it in the clock before.
+        self.kept = z3.Or(self.blocked, self.outputs["limited"] == 1)
         self.ghosts_after = self.remembered()
 
     def ghost_kinds(self) -> dict[str, tuple[int, bool]]:
@@ -269,7 +271,7 @@ class _Clock:
                 turns,
                 z3.And(
                     owed == z3.If(downwards, z3.BitVecVal(-1, self.wide), 1),
-                    *(z3.Not(self.stopped), z3.Not(self.blocked)),
+                    *(z3.Not(self.stopped), z3.Not(self.kept)),
                 ),
             )
         return [
@@ -302,7 +304,7 @@ class _Clock:
             self.to_go(self.after, self.ghosts_after),
         )
         unstopped = z3.And(self.waits, z3.Not(self.stopped))
-        free, none = z3.And(unstopped, z3.Not(self.blocked)), z3.Not(self.put_out)
+        free, none = z3.And(unstopped, z3.Not(self.kept)), z3.Not(self.put_out)
         left = [count for counts in before.values() for count in counts]
         claims = {
             "launched": z3.Implies(free, self.put_out == z3.And([count == 0 for count in left])),
@@ -330,7 +332,7 @@ class _Clock:
                     f"bound, {what} {a}": z3.And(count >= 0, count <= bounds[index]),
                     f"nearer, {what} {a}": z3.Implies(z3.And(free, none), later == nearer[index]),
                     f"no farther, {what} {a}": z3.Implies(
-                        z3.And(unstopped, self.blocked), later <= count
+                        z3.And(unstopped, self.kept), later <= count
                     ),
                 }
         return claims
@@ -421,6 +423,11 @@ class _Clock:
                     (self.later["limited"] == 1)
                     == z3.And(self.waits, z3.Not(self.stopped), self.blocked)
                 ],
+            ),
+            Obligation(
+                "limited: while it says so no leading edge follows",
+                [*known, self.outputs["limited"] == 1],
+                [none],
             ),
             Obligation(
                 "it never hangs: a step that waits is launched after at most L + max(S − 1, "

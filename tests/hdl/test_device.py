@@ -549,6 +549,32 @@ def test_a_limit_switch_stops_it(switch, end):
     assert seen["reason"][61:].tolist() == [0] * (len(seen["reason"]) - 61)
 
 
+def test_a_switch_that_is_active_for_a_clock_drops_the_step_that_waits():
+    """Whenever it is: each step is put out before it, or not at all."""
+    free = pulses_of(run(PysimModel, make(4, ("line",)), [line(9, 0)], 60, calm()))[0]
+    assert len(free) == 9
+    limited = 0
+    for clock in range(free[0], free[-1]):
+        orders = [*calm(), (clock, "high_limit_x", 1), (clock + 1, "high_limit_x", 0)]
+        seen = run(PysimModel, make(4, ("line",)), [line(9, 0)], 60, orders)
+        clocks, steps = pulses_of(seen)
+        stood = np.flatnonzero(seen["reason"] == 3)
+        limited += len(stood) > 0
+        assert len(steps) == (9 if not len(stood) else np.sum(clocks <= stood[0]))
+        assert seen["position_x"][-1] == len(steps)
+        assert (len(steps) < 9) == (len(stood) > 0)
+    assert limited > 5
+
+
+def test_the_last_step_before_a_refused_block_is_dropped_by_a_limit():
+    orders = [*calm(), (0, "high_limit_x", 1), (60, "high_limit_x", 0), (70, "clear", 1)]
+    blocks = [line(1, 0), arc(5, 0, (0, 0))]
+    seen = run(PysimModel, make(4, ("line", "arc")), blocks, 90, orders)
+    # The end of the arc is off its circle: told while the step before it waits at the switch.
+    assert seen["reason"][69] == 3
+    assert not seen["pins_x_step"].any()
+
+
 def test_a_limit_switch_stops_it_again():
     orders = [*calm(), (0, "high_limit_x", 1), (40, "clear", 1), (41, "clear", 0)]
     seen = run(PysimModel, make(4, ("line",)), [line(9, 0)] * 4, 100, orders)
@@ -722,7 +748,7 @@ def emergency_ignored_for_pending(device, m):
     """What is pending in the pulse unit at an emergency is put out."""
     reason = device.reason_register
     m.d.comb += device.pulse.stop.eq(
-        (reason == StopReason.EMERGENCY) | (reason == StopReason.LIMIT)
+        device.pulse.limited | (reason == StopReason.EMERGENCY) | (reason == StopReason.LIMIT)
     )
 
 

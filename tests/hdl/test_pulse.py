@@ -244,9 +244,9 @@ def test_a_step_towards_an_active_switch_waits_as_a_whole(limit, step, waits):
     events = {0: {limit: 1}, 20: {limit: 0}}
     steps = [(0, 0)] * 3 + [step]
     seen = trace(PulseUnit(8), steps, 40, TYPICAL, events)
-    # In 4 it waits, 5 says so. The release is known in 21: launched or turned then, seen in 22.
+    # In 4 it waits, 5 says so. The release is known in 21: launched or turned in 22, seen in 23.
     assert seen["limited"] == [int(waits and 5 <= clock <= 21) for clock in range(40)]
-    begins = (22 if waits else 5) + 4 * (min(step) < 0)
+    begins = (23 if waits else 5) + 4 * (min(step) < 0)
     for a, moves in zip("xy", step, strict=True):
         assert rises(seen[f"pins_{a}_step"]) == ([begins] if moves else [])
         assert rises(seen[f"pins_{a}_direction"]) == ([begins - 4] if moves < 0 else [])

@@ -9,7 +9,7 @@ from discreta.hdl.circular import Circular
 from discreta.hdl.conic import Conic
 from discreta.hdl.device import Device
 from discreta.hdl.linear import Linear
-from discreta.sim.golden.device import EMERGENCY, make_device
+from discreta.sim.golden.device import EMERGENCY, LIMIT, make_device
 from discreta.sim.golden.device import Device as GoldenDevice
 from discreta.sim.golden.feed import FeedUnit
 from discreta.sim.golden.logic import equal, negate, where
@@ -246,6 +246,14 @@ class InterpolatorKept(Broken):
         return {"line_pulse_x": kept}
 
 
+class LimitedPutOut(Broken):
+    """The pulse unit is told of a limit only when the device stands for it."""
+
+    def changed(self, now, after):
+        stops = now["emergency"] | equal(now["reason"], EMERGENCY) | equal(now["reason"], LIMIT)
+        return {"stopping": after["stopping"] & stops}
+
+
 class LimitUnsaid(Broken):
     """A limit switch does not stop the device."""
 
@@ -263,6 +271,7 @@ class LimitUnsaid(Broken):
         (StopsUnderAStep, "invariant: survives"),
         (StepLost, "position"),
         (InterpolatorKept, "stands"),
+        (LimitedPutOut, "invariant: survives"),
         (LimitUnsaid, "limit"),
     ],
 )

@@ -22,7 +22,7 @@ def test_everything_is_proven(width, kind):
     golden = GoldenPulseUnit(width, 2, kind, **INVERTED)
     unit = PulseUnit(width, kind=kind, **INVERTED)
     verdicts = [check(it) for it in equivalence(unit, golden) + promises(golden)]
-    assert len(verdicts) == (19 if kind == "step_direction" else 16)
+    assert len(verdicts) == (20 if kind == "step_direction" else 17)
     assert [verdict for verdict in verdicts if not verdict.holds] == []
 
 
@@ -80,7 +80,8 @@ def leads(unit: PulseUnit, a: str) -> Any:
 
 def free(unit: PulseUnit) -> Any:
     """Tell that the step that waits may turn its axes."""
-    return Cat(unit.moves.values()).any() & ~unit.stopping & ~unit.blocked
+    waits = Cat(unit.moves.values()).any() & ~unit.stopping
+    return waits & ~unit.blocked & ~unit.limited
 
 
 class Short(GoldenPulseUnit):
@@ -149,7 +150,8 @@ def hold_ignored(unit, m):
 
 class TurnsWhenLimited(GoldenPulseUnit):
     def step(self, state, inputs):
-        off = {f"at_{end}_{a}": 0 * state["at_low_x"] for end in ("low", "high") for a in "xy"}
+        switches = [f"at_{end}_{a}" for end in ("low", "high") for a in "xy"]
+        off = dict.fromkeys((*switches, "limited"), 0 * state["limited"])
         turned = super().step(state | off, inputs)
         names = [f"{name}_{a}" for name in ("direction", "direction_age") for a in "xy"]
         return super().step(state, inputs) | {name: turned[name] for name in names}
@@ -224,7 +226,7 @@ class LateStop(GoldenPulseUnit):
 def stop_a_clock_late(unit, m):
     waiting = Cat(unit.moves.values()).any()
     due = Cat(~unit.moves[a] | unit.due[a] for a in "xy").all()
-    m.d.comb += unit.launch.eq(waiting & ~unit.blocked & due)
+    m.d.comb += unit.launch.eq(waiting & ~unit.blocked & ~unit.limited & due)
 
 
 class OneSwitch(GoldenPulseUnit):
@@ -247,6 +249,21 @@ class StoppedIsLimited(GoldenPulseUnit):
 @variant("limited", StoppedIsLimited)
 def limited_though_it_is_stopped(unit, m):
     m.d.sync += unit.limited_register.eq(unit.blocked)
+
+
+class GoesOnAtOnce(GoldenPulseUnit):
+    def _free(self, state):
+        return super()._free(state | {"limited": 0 * state["limited"]})
+
+
+@variant("limited: while", GoesOnAtOnce)
+def goes_on_in_the_clock_of_the_release(unit, m):
+    waits = Cat(unit.moves.values()).any() & ~unit.stopping & ~unit.blocked
+    m.d.comb += unit.launch.eq(waits & Cat(~unit.moves[a] | unit.due[a] for a in "xy").all())
+    for a in "xy":
+        wrong = unit.direction[a] != unit.pending[a][1]
+        may = waits & ~unit.pulse[a] & (unit.age[a] >= unit.hold)
+        m.d.comb += unit.turn[a].eq(may & unit.moves[a] & wrong)
 
 
 class NewLength(GoldenPulseUnit):
