@@ -1,6 +1,6 @@
 """The position register (P3, P4 of the linear, P1, P2 of the circular interpolator)."""
 
-from amaranth import Module, Signal
+from amaranth import Cat, Const, Module, Signal
 from amaranth.hdl import signed, unsigned
 from amaranth.lib.wiring import In
 
@@ -45,8 +45,8 @@ class PositionRegister(Part):
         m = Module()
         with m.If(self.load):
             m.d.sync += self.register.eq(self.initial)
-        with m.Elif(self.up & ~self.down):
-            m.d.sync += self.register.eq(self.register + 1)
-        with m.Elif(self.down & ~self.up):
-            m.d.sync += self.register.eq(self.register - 1)
+        with m.Elif(self.up != self.down):
+            # 1 or −1 by one adder.
+            ones = self.down.replicate(len(self.register) - 1)
+            m.d.sync += self.register.eq(self.register + Cat(Const(1, 1), ones).as_signed())
         return m
