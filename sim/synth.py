@@ -19,7 +19,6 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -280,9 +279,9 @@ class Harness(wiring.Component):
         self.domain = ClockDomain("sync")
         self.inputs = ["rst", *_bits(self.core.inputs)]
         self.outputs = _bits(self.core.outputs)
-        self.fed = Signal(len(self.inputs), reset_less=True)
-        self.caught = Signal(len(self.outputs), reset_less=True)
-        self.folded = Signal(len(self.outputs), reset_less=True)
+        self.fed = Signal(len(self.inputs), reset_less=True, attrs={"keep": 1})
+        self.caught = Signal(len(self.outputs), reset_less=True, attrs={"keep": 1})
+        self.folded = Signal(len(self.outputs), reset_less=True, attrs={"keep": 1})
 
     def elaborate(self, platform):
         """Describe the hardware."""
