@@ -4,14 +4,17 @@ Yosys makes the cells and nextpnr places them and finds the critical path; both 
 the ``boards`` extra. The same core gives the same numbers on every machine.
 
 The cells are those of the core by itself, as its own top module. For the clock it is placed and
-routed in a :class:`Harness`, which has three pins, however many ports the core has. The seed of the
-placement changes the clock by some percent, so there are several runs and the median counts.
+routed in a :class:`~discreta.hdl.harness.Harness`, which has three pins, however many ports the
+core has. The seed of the placement changes the clock by some percent, so there are several runs and
+the median counts.
 
 Source: none, it is ours.
 """
 
 import json
+import os
 import re
+import signal
 import statistics
 import subprocess
 import sys
@@ -19,26 +22,25 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from amaranth import Cat, ClockDomain, Module, ResetSignal, Signal
 from amaranth.back import rtlil
-from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
 
 from discreta.hdl.contract import Part
+from discreta.hdl.harness import Harness, bit_name
 from discreta.hdl.plain import PlainPorts
 from discreta.sim.yosys import yosys
 
 __all__ = [
     "DEVICES",
+    "RUNS",
     "SEEDS",
     "CriticalPath",
     "Fpga",
-    "Harness",
-    "LoneAccumulator",
     "Measurement",
     "SynthesisError",
     "measure",
@@ -46,6 +48,9 @@ __all__ = [
 
 #: Those of the placement.
 SEEDS = (1, 2, 3, 4, 5)
+
+#: Processes of a measurement with these: two of Yosys, and nextpnr's, one of which only packs.
+RUNS = 3 + len(SEEDS)
 
 #: MHz asked for: more than any core reaches, so that nextpnr never rests.
 _TARGET = 400
@@ -214,109 +219,13 @@ class Measurement:
         return statistics.median_low(self.fmax.values()) if self.fmax else None
 
 
-class LoneAccumulator(Part):
-    """An accumulator and nothing else: what limits every core that sums.
-
-    A clock computes (carry, acc) := acc + ``addend``.
-
-    Latency: one clock.
-    Throughput: one summation a clock.
-    Overflow: the carry.
-    Reset: all is 0.
-    Error: none.
-    Source: none, it is ours.
-
-    Parameters
-    ----------
-    width : int
-        Bits.
-    """
-
-    def __init__(self, width: int):
-        super().__init__({"addend": In(width), "carry": Out(1)})
-        self.acc = Signal(width)
-        self.registers = {"acc": self.acc, "carry": self.carry}
-
-    def elaborate(self, platform):
-        """Describe the hardware."""
-        m = Module()
-        m.d.sync += Cat(self.acc, self.carry).eq(self.acc + self.addend)
-        return m
-
-
-class Harness(wiring.Component):
-    """Registers around a core, with a pin to feed them all and a pin that depends on them all.
-
-    The inputs of the core, its reset too, are the stages of a shift register, each the inverse of
-    the one before it: otherwise a register of the core that only delays an input would be the
-    next stage, and be shared with it. The outputs go each into a register of its own, and from
-    there into a chain of registers, each the exclusive or of the one before it and of one output.
-    So every output reaches the pin at a time of its own, and no two can cancel out. Between two
-    registers of the harness lies one LUT.
-
-    Latency: as many clocks as there are bits.
-    Throughput: a bit in and a bit out every clock.
-    Overflow, error: none.
-    Reset: none of its own; the core is reset by the first stage.
-    Source: none, it is ours.
-
-    Parameters
-    ----------
-    core : Part
-        The core, or its :class:`~discreta.hdl.plain.PlainPorts`.
-
-    Attributes
-    ----------
-    fed, caught, folded : Signal
-        The shift register; the outputs; the chain.
-    inputs, outputs : list of str
-        What each bit of ``fed`` and of ``caught`` is for.
-    """
-
-    def __init__(self, core: Part):
-        super().__init__({"d": In(1), "q": Out(1)})
-        self.core = core if isinstance(core, PlainPorts) else PlainPorts(core)
-        self.domain = ClockDomain("sync")
-        self.inputs = ["rst", *_bits(self.core.inputs)]
-        self.outputs = _bits(self.core.outputs)
-        self.fed = Signal(len(self.inputs), reset_less=True, attrs={"keep": 1})
-        self.caught = Signal(len(self.outputs), reset_less=True, attrs={"keep": 1})
-        self.folded = Signal(len(self.outputs), reset_less=True, attrs={"keep": 1})
-
-    def elaborate(self, platform):
-        """Describe the hardware."""
-        m = Module()
-        m.domains += self.domain
-        m.submodules.core = self.core
-        m.d.sync += [
-            self.fed.eq(~Cat(self.d, self.fed)),
-            self.caught.eq(Cat(self.core.outputs.values())),
-            self.folded.eq(self.caught ^ (self.folded << 1)),
-        ]
-        m.d.comb += [
-            Cat(ResetSignal(), self.core.inputs.values()).eq(self.fed),
-            self.q.eq(self.folded[-1]),
-        ]
-        return m
-
-
-def _bits(ports: dict[str, Signal]) -> list[str]:
-    return [
-        _bit(name, index, len(port)) for name, port in ports.items() for index in range(len(port))
-    ]
-
-
-def _bit(name: str, index: int, width: int) -> str:
-    return f"{name}[{index}]" if width > 1 else name
-
-
 def measure(
     core: Part,
     device: str = "hx8k",
     seeds: Iterable[int] = SEEDS,
     *,
     workers: int = 1,
-    progress: Callable[[int], None] = lambda _: None,
+    progress: Callable[[], None] = lambda: None,
 ) -> Measurement:
     """Measure a core on an FPGA.
 
@@ -331,14 +240,19 @@ def measure(
     workers : int
         How many processes to run at once.
     progress : callable
-        Called after every process with 1; there are three and one for every seed.
+        Called after every process; there are three, and one for every seed.
 
     Raises
     ------
+    ModuleNotFoundError
+        Yosys or nextpnr is not installed: the extra ``boards`` brings both.
     SynthesisError
-        Yosys refuses the core, or nextpnr has no cell of a kind at all.
+        Yosys refuses the core, or nextpnr has no cells of a kind that it needs.
     """
     fpga, seeds = DEVICES[device], tuple(seeds)
+    for needed in ("pyosys", f"yowasp_nextpnr_{fpga.place}"):
+        if find_spec(needed) is None:
+            raise ModuleNotFoundError(f"no module named {needed!r}", name=needed)
     top = core if isinstance(core, PlainPorts) else PlainPorts(core)
     harness = Harness(top)
     pins = [harness.domain.clk, harness.d, harness.q]
@@ -393,8 +307,15 @@ def _module(file: Path) -> Any:
 
 
 def _synthesize(fpga: Fpga, module: str) -> list[str]:
-    command = f"{fpga.synthesis} -top {module} -json {module}.json"
-    return yosys(f"read_rtlil {module}.il", command)
+    command = f"{fpga.synthesis} -top {module}"
+    # Flip-flops are named after their registers as long as these have their own values: one that
+    # starts from 1 is inverted where there are none but those that start from 0.
+    return yosys(
+        f"read_rtlil {module}.il",
+        f"{command} -run begin:map_ffs",
+        "rename -wire t:$_*DFF*_",
+        f"{command} -run map_ffs: -json {module}.json",
+    )
 
 
 def _nextpnr(fpga: Fpga, *arguments: str) -> list[str]:
@@ -412,7 +333,7 @@ def _place(fpga: Fpga, seed: int) -> list[str]:
 class _Runner:
     """Runs commands in a folder, some at once, and ends them when it is interrupted."""
 
-    def __init__(self, folder: Path, workers: int, progress: Callable[[int], None]):
+    def __init__(self, folder: Path, workers: int, progress: Callable[[], None]):
         self._folder, self._workers, self._progress = folder, workers, progress
 
     def __call__(self, *commands: list[str]) -> list[str]:
@@ -425,19 +346,26 @@ class _Runner:
                 while waiting and len(running) < self._workers:
                     command, log = waiting.pop(0)
                     with log.open("w") as out:
+                        # A session of its own: Yosys starts processes, too, that must end with it.
                         running[log] = subprocess.Popen(
-                            command, cwd=self._folder, stdout=out, stderr=subprocess.STDOUT
+                            command,
+                            cwd=self._folder,
+                            env=os.environ | {"TMPDIR": str(self._folder)},
+                            stdout=out,
+                            stderr=subprocess.STDOUT,
+                            start_new_session=True,
                         )
                 time.sleep(_POLL)
                 for log, process in list(running.items()):
                     if process.poll() is not None:
                         del running[log]
-                        self._progress(1)
+                        self._progress()
                         if process.returncode:
                             raise SynthesisError(_complaint(log.read_text()))
         finally:
             for process in running.values():
-                process.kill()
+                with suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
         return [log.read_text() for log in logs]
 
@@ -458,40 +386,37 @@ class _Names:
     """Says which register a cell of a placed netlist holds."""
 
     def __init__(self, harness: Harness, folder: Path, seed: int):
-        self._registers = getattr(harness.core.core, "registers", {})
-        self._harness = {
-            "fed": [f"input {name}" for name in harness.inputs],
-            "caught": [f"output {name}" for name in harness.outputs],
-            "folded": ["harness"] * len(harness.outputs),
-        }
         placed = _module(folder / f"placed-{seed}.json")
         self._cells = placed["cells"]
         self._nets = {net["bits"][0]: name for name, net in placed["netnames"].items()}
-        # A wire has many names in Yosys' netlist, of which nextpnr takes any.
-        best: dict[Any, tuple] = {}
-        self._bits: dict[str, Any] = {}
-        for name, net in _module(folder / "harness.json")["netnames"].items():
-            for index, bit in enumerate(net["bits"]):
-                self._bits[_bit(name, index, len(net["bits"]))] = bit
-                rank = self._rank(name, index, len(net["bits"]))
-                best[bit] = min(rank, best.get(bit, rank))
-        self._best = {bit: name for bit, (*_, name) in best.items()}
+        netlist = _module(folder / "harness.json")
+        self._bits = {
+            bit_name(name, index, len(net["bits"])): bit
+            for name, net in netlist["netnames"].items()
+            for index, bit in enumerate(net["bits"])
+        }
+        registers = getattr(harness.core.core, "registers", {})
+        around = {"fed": ("input", harness.inputs), "caught": ("output", harness.outputs)}
+        self._registers: dict[Any, str] = {}
+        for name, cell in netlist["cells"].items():
+            named = re.fullmatch(r"(.*?)(?:\$\d+)?(\[\d+\])?\$_\w+", name)
+            if named is None or "Q" not in cell["connections"]:
+                continue
+            path, index = named[1], named[2] or ""
+            register = path.rpartition(".")[2]
+            if path in around:
+                what, ports = around[path]
+                path, index = f"{what} {ports[int(index[1:-1] or 0)]}", ""
+            elif register in registers:
+                path = register
+            (driven,) = cell["connections"]["Q"]
+            self._registers[driven] = path.removeprefix("core.core.") + index
 
     def __call__(self, cell: str) -> str:
         """Name the register, or the cell when it holds none."""
         outputs = self._cells[cell]["connections"]
         bits = outputs.get("Q") or outputs.get("O") or [None]
-        return self._best.get(self._bits.get(self._nets.get(bits[0], "")), cell)
-
-    def _rank(self, name: str, index: int, width: int) -> tuple[bool, int, int, str]:
-        """Give a name for people, behind what makes it a better one than others."""
-        if name in self._harness:
-            return False, 0, 0, self._harness[name][index]
-        *path, last = (
-            re.sub(r"\$\d+", "", name).removeprefix("core.").removeprefix("core.").split(".")
-        )
-        plain = _bit(".".join([*path, last]), index, width)
-        return last not in self._registers, len(path), len(plain), plain
+        return self._registers.get(self._bits.get(self._nets.get(bits[0], "")), cell)
 
 
 def _path(report: Any, names: _Names) -> CriticalPath:
