@@ -55,6 +55,9 @@ RUNS = 3 + len(SEEDS)
 #: MHz asked for: more than any core reaches, so that nextpnr never rests.
 _TARGET = 400
 
+#: The file with the places of pins.
+_PINS = "pins.cst"
+
 #: Seconds between two looks at what runs.
 _POLL = 0.02
 
@@ -80,9 +83,12 @@ class Fpga:
     options : tuple of str
         What nextpnr is told of the FPGA.
     logic : str
-        What nextpnr calls a logic cell: a LUT with or without a flip-flop and a carry.
+        What nextpnr calls a LUT that is taken, be it as a LUT, for a carry or on the way to a
+        flip-flop. On iCE40 every flip-flop takes one.
     cells : dict of str to str
         Regular expressions of the types of cells to count, by what is counted.
+    pins : str
+        Places of the harness's pins, for a nextpnr that chooses none, in its own words.
     """
 
     name: str
@@ -92,6 +98,7 @@ class Fpga:
     options: tuple[str, ...]
     logic: str
     cells: dict[str, str]
+    pins: str = ""
 
 
 _ICE40_CELLS = {
@@ -152,6 +159,7 @@ DEVICES = {
                 "memories": "(DP|SDP|SP|ROM|DPX9|SDPX9|SPX9|ROMX9)B?",
                 "flip_flops": "DFF.*",
             },
+            pins='IO_LOC "clk" 52;\nIO_LOC "d" 25;\nIO_LOC "q" 26;\n',
         ),
     )
 }
@@ -261,6 +269,7 @@ def measure(
         write = Path(folder, "harness.il").write_text
         write(rtlil.convert(harness, ports=pins, name="harness", emit_src=False))
         Path(folder, "core.il").write_text(rtlil.convert(top, name="core", emit_src=False))
+        Path(folder, _PINS).write_text(fpga.pins)
         run = _Runner(folder, workers, progress)
         run(*(_synthesize(fpga, module) for module in ("core", "harness")))
         (log,) = run(_nextpnr(fpga, "--json", "core.json", "--pack-only"))
@@ -314,7 +323,9 @@ def _synthesize(fpga: Fpga, module: str) -> list[str]:
         f"read_rtlil {module}.il",
         f"{command} -run begin:map_ffs",
         "rename -wire t:$_*DFF*_",
-        f"{command} -run map_ffs: -json {module}.json",
+        f"{command} -run map_ffs:",
+        *(["delete -port x:*", "delete t:?BUF"] if module == "core" else []),
+        f"write_json {module}.json",
     )
 
 
@@ -327,7 +338,8 @@ def _nextpnr(fpga: Fpga, *arguments: str) -> list[str]:
 def _place(fpga: Fpga, seed: int) -> list[str]:
     target = ("--freq", str(_TARGET), "--timing-allow-fail", "--seed", str(seed))
     results = ("--report", f"report-{seed}.json", "--write", f"placed-{seed}.json")
-    return _nextpnr(fpga, "--json", "harness.json", *target, *results)
+    pins = ("--vopt", f"cst={_PINS}") if fpga.pins else ()
+    return _nextpnr(fpga, "--json", "harness.json", *target, *results, *pins)
 
 
 class _Runner:
