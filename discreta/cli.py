@@ -60,7 +60,7 @@ from discreta.sim.points import (
 )
 from discreta.sim.run import run, say_choices
 from discreta.sim.simulate import ENGINES, DeadCoreError, default_engine
-from discreta.sim.synth import DEVICES, RUNS, Measurement, measure
+from discreta.sim.synth import DEVICES, RUNS, Measurement, SynthesisError, measure
 
 __all__ = ["main"]
 
@@ -813,7 +813,10 @@ def synth_command(
                 f"synthesis needs {error.name}: install the extra, pip install 'discreta[boards]'"
             ) from None
         if file is not None:
-            found = [{"core": name} | asdict(row) for name, row in zip(names, rows, strict=True)]
+            found = [
+                {"core": name, "median": row.median, "of_the_limit": row.of(rows[-1])} | asdict(row)
+                for name, row in zip(names, rows, strict=True)
+            ]
             json.dump({"device": device, "width": width, "cores": found}, file, indent=2)
             file.write("\n")
     _print_measurements(list(zip(names, rows, strict=True)), err=json_file == "-")
@@ -826,15 +829,14 @@ def _print_measurements(rows: list[tuple[str, Measurement]], *, err: bool) -> No
     counts = ("LUTs", "carries", "multipliers", "block RAM", "flip-flops", "logic cells")
     table = _table(("core", *counts, "MHz", "lowest", "highest", "of the limit"))
     paths = _table(("core", "ns", "on wires", "levels", "carries", "from", "to"))
-    limit = rows[-1][1].median
     for name, row in rows:
         cells = (row.luts, row.carries, row.multipliers, row.memories, row.flip_flops)
         speeds = ["-"] * 4
         if row.median is not None:
             clocks = (row.median, min(row.fmax.values()), max(row.fmax.values()))
             speeds[:3] = [f"{clock:.1f}" for clock in clocks]
-            if limit is not None:
-                speeds[3] = f"{row.median / limit:.3f}"
+        if (share := row.of(rows[-1][1])) is not None:
+            speeds[3] = f"{share:.3f}"
         table.add_row(name, *map(str, (*cells, row.logic_cells)), *speeds)
         if (path := row.path) is not None:
             times = (f"{path.nanoseconds:.2f}", f"{path.routing_nanoseconds:.2f}")
@@ -1183,7 +1185,7 @@ def _run(arguments: list[str] | None = None) -> int:
         name = "" if error.filename is None else f" {error.filename or repr('')}"
         _complain(f"cannot write{name}: {error.strerror}")
         return 2
-    except DeadCoreError as error:
+    except (DeadCoreError, SynthesisError) as error:
         _complain(str(error))
         return 1
 

@@ -4,7 +4,7 @@ from amaranth import Cat, ClockDomain, Module, ResetSignal, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from discreta.hdl.contract import Part
+from discreta.hdl.contract import Part, check_width
 from discreta.hdl.plain import PlainPorts
 
 __all__ = ["Harness", "LoneAccumulator", "bit_name"]
@@ -25,10 +25,16 @@ class LoneAccumulator(Part):
     Parameters
     ----------
     width : int
-        Bits.
+        4 to 32 bits.
+
+    Raises
+    ------
+    TypeError, ValueError
+        ``width`` is not one of the above.
     """
 
     def __init__(self, width: int):
+        check_width(width)
         super().__init__({"addend": In(width), "carry": Out(1)})
         self.acc = Signal(width)
         self.registers = {"acc": self.acc, "carry": self.carry}

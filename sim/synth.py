@@ -30,7 +30,7 @@ from typing import Any
 
 from amaranth.back import rtlil
 
-from discreta.hdl.contract import Part
+from discreta.hdl.contract import Part, check_choice
 from discreta.hdl.harness import Harness, bit_name
 from discreta.hdl.plain import PlainPorts
 from discreta.sim.yosys import yosys
@@ -226,6 +226,12 @@ class Measurement:
         """The clock that counts, in MHz: that of one of the runs."""
         return statistics.median_low(self.fmax.values()) if self.fmax else None
 
+    def of(self, limit: "Measurement") -> float | None:
+        """Give its clock in parts of another one's; None when either cannot be placed."""
+        if self.median is None or limit.median is None:
+            return None
+        return self.median / limit.median
+
 
 def measure(
     core: Part,
@@ -252,12 +258,17 @@ def measure(
 
     Raises
     ------
+    ValueError
+        There is no such device, or no seed.
     ModuleNotFoundError
         Yosys or nextpnr is not installed: the extra ``boards`` brings both.
     SynthesisError
         Yosys refuses the core, or nextpnr has no cells of a kind that it needs.
     """
+    check_choice("device", device, tuple(DEVICES))
     fpga, seeds = DEVICES[device], tuple(seeds)
+    if not seeds:
+        raise ValueError("seeds are none: give one or more whole numbers")
     for needed in ("pyosys", f"yowasp_nextpnr_{fpga.place}"):
         if find_spec(needed) is None:
             raise ModuleNotFoundError(f"no module named {needed!r}", name=needed)
@@ -385,7 +396,8 @@ class _Runner:
 def _complaint(log: str) -> str:
     """Find in a log what went wrong: the error, or the last line."""
     lines = [line for line in log.splitlines() if line.strip()] or ["it ended without a word"]
-    return next((line for line in lines if line.startswith("ERROR: ")), lines[-1])
+    errors = [line for line in lines if line.startswith("ERROR: ")]
+    return (errors or lines[-1:])[0].removeprefix("ERROR: ")
 
 
 def _fmax(report: Any) -> float:
