@@ -819,12 +819,13 @@ def synth_command(
             ]
             json.dump({"device": device, "width": width, "cores": found}, file, indent=2)
             file.write("\n")
-    _print_measurements(list(zip(names, rows, strict=True)), err=json_file == "-")
+    title = f"{DEVICES[device].title}, width {width}"
+    _print_measurements(title, list(zip(names, rows, strict=True)), err=json_file == "-")
     if any(row.problem for row in rows):
         raise click.exceptions.Exit(1)
 
 
-def _print_measurements(rows: list[tuple[str, Measurement]], *, err: bool) -> None:
+def _print_measurements(title: str, rows: list[tuple[str, Measurement]], *, err: bool) -> None:
     """Print what cores take of an FPGA, the last one the limit of all, and their critical paths."""
     counts = ("LUTs", "carries", "multipliers", "block RAM", "flip-flops", "logic cells")
     table = _table(("core", *counts, "MHz", "lowest", "highest", "of the limit"))
@@ -843,6 +844,7 @@ def _print_measurements(rows: list[tuple[str, Measurement]], *, err: bool) -> No
             through = (str(path.levels), str(path.carries))
             paths.add_row(name, *times, *through, path.start, path.end)
     out = _out(err=err)
+    out.print(title)
     out.print(table)
     out.print("critical paths")
     out.print(paths)

@@ -23,7 +23,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -101,34 +101,32 @@ class Fpga:
     pins: str = ""
 
 
-_ICE40_CELLS = {
-    "luts": "SB_LUT4",
-    "carries": "SB_CARRY",
-    "multipliers": "SB_MAC16",
-    "memories": "SB_RAM40_4K.*",
-    "flip_flops": "SB_DFF.*",
-}
+_HX8K = Fpga(
+    name="hx8k",
+    title="Lattice iCE40 HX8K",
+    synthesis="synth_ice40 -device hx",
+    place="ice40",
+    options=("--hx8k", "--package", "ct256"),
+    logic="ICESTORM_LC",
+    cells={
+        "luts": "SB_LUT4",
+        "carries": "SB_CARRY",
+        "multipliers": "SB_MAC16",
+        "memories": "SB_RAM40_4K.*",
+        "flip_flops": "SB_DFF.*",
+    },
+)
 
 DEVICES = {
     fpga.name: fpga
     for fpga in (
-        Fpga(
-            name="hx8k",
-            title="Lattice iCE40 HX8K",
-            synthesis="synth_ice40 -device hx",
-            place="ice40",
-            options=("--hx8k", "--package", "ct256"),
-            logic="ICESTORM_LC",
-            cells=_ICE40_CELLS,
-        ),
-        Fpga(
+        _HX8K,
+        replace(
+            _HX8K,
             name="up5k",
             title="Lattice iCE40 UP5K",
             synthesis="synth_ice40 -device u -dsp",
-            place="ice40",
             options=("--up5k", "--package", "sg48"),
-            logic="ICESTORM_LC",
-            cells=_ICE40_CELLS,
         ),
         Fpga(
             name="ecp5-25k",

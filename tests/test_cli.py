@@ -1510,7 +1510,8 @@ def test_synthesis(discreta, synthesised):
     assert [type(core) for core, _ in synthesised] == [Linear, Comparison, LoneAccumulator]
     assert {device for _, device in synthesised} == {"up5k"}
     assert [core.width for core, _ in synthesised[:2]] == [8, 8]
-    head, *rows = (" ".join(line.split()) for line in out.splitlines())
+    title, head, *rows = (" ".join(line.split()) for line in out.splitlines())
+    assert title == "Lattice iCE40 UP5K, width 8"
     assert head.endswith("logic cells MHz lowest highest of the limit")
     assert rows == [
         "linear 12 3 1 2 9 14 100.0 91.2 120.0 0.500",
@@ -1525,7 +1526,7 @@ def test_synthesis(discreta, synthesised):
 def test_synthesis_as_json(discreta, synthesised):
     code, out, err = discreta("synth", "linear", "--axes", "3", "--no-normalize", "--json", "-")
     assert code == 0
-    assert err.splitlines()[1].split()[0] == "linear"
+    assert err.splitlines()[2].split()[0] == "linear"
     read = json.loads(out)
     assert (read["device"], read["width"]) == ("hx8k", 16)
     assert [core["core"] for core in read["cores"]] == ["linear", "accumulator"]
@@ -1540,7 +1541,7 @@ def test_synthesis_as_json(discreta, synthesised):
 def test_synthesis_of_what_has_no_room(discreta):
     code, out, err = discreta("synth", "linear", "circular", "--json", "s.json")
     assert (code, err) == (1, "circular: no room for p1\n")
-    assert out.splitlines()[2].split()[-5:] == ["14", "-", "-", "-", "-"]
+    assert out.splitlines()[3].split()[-5:] == ["14", "-", "-", "-", "-"]
     read = json.loads(Path("s.json").read_text())
     assert [core["problem"] for core in read["cores"]] == ["", "no room for p1", ""]
 
