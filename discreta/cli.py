@@ -792,6 +792,7 @@ def synth_command(
     """
     makers = [_maker(method, width, axes, setting, given) for method in methods]
     makers.append(partial(LoneAccumulator, width))
+    workers = min(2, os.cpu_count() or 1)  # one may take 400 MB, and all together shall take 1 GB
     names = [*(method.name for method in methods), "accumulator"]
     done = 0
 
@@ -804,10 +805,7 @@ def synth_command(
         file = None if json_file is None else outputs.open(json_file)
         show(0, len(makers) * RUNS)
         try:
-            rows = [
-                measure(make(), device, workers=os.cpu_count() or 1, progress=progress)
-                for make in makers
-            ]
+            rows = [measure(make(), device, workers=workers, progress=progress) for make in makers]
         except ModuleNotFoundError as error:
             raise BadInputError(
                 f"synthesis needs {error.name}: install the extra, pip install 'discreta[boards]'"

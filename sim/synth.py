@@ -23,7 +23,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -197,7 +197,7 @@ class Measurement:
     luts, carries, multipliers, memories, flip_flops : int
         Cells of the core by itself, as Yosys counts them.
     cells : dict of str to int
-        All of them, by their types.
+        Cells of all types there are.
     logic_cells : int
         Logic cells of the FPGA that the core by itself takes when nextpnr has packed it.
     fmax : dict of int to float
@@ -215,8 +215,8 @@ class Measurement:
     flip_flops: int
     cells: dict[str, int]
     logic_cells: int
-    fmax: dict[int, float]
-    path: CriticalPath | None
+    fmax: dict[int, float] = field(default_factory=dict)
+    path: CriticalPath | None = None
     problem: str = ""
 
     @property
@@ -283,32 +283,21 @@ def measure(
         run(*(_synthesize(fpga, module) for module in ("core", "harness")))
         (log,) = run(_nextpnr(fpga, "--json", "core.json", "--pack-only"))
         used = {kind: int(count) for kind, count in re.findall(r"(\w+): +(\d+)/ *\d+", log)}
-        cells = Counter(cell["type"] for cell in _module(folder / "core.json")["cells"].values())
-        counts = {
+        types = [cell["type"] for cell in _module(folder / "core.json")["cells"].values()]
+        cells = Counter(kind for kind in sorted(types) if not kind.startswith("$"))
+        counts: dict[str, Any] = {
             what: sum(count for kind, count in cells.items() if re.fullmatch(kinds, kind))
             for what, kinds in fpga.cells.items()
         }
-        fmax: dict[int, float] = {}
-        path = None
-        problem = ""
+        measured = Measurement(**counts, cells=dict(cells), logic_cells=used[fpga.logic])
         try:
             run(*(_place(fpga, seed) for seed in seeds))
         except SynthesisError as error:
-            problem = str(error)
-        else:
-            reports = {seed: _json(folder / f"report-{seed}.json") for seed in seeds}
-            fmax = {seed: _fmax(report) for seed, report in reports.items()}
-            median = statistics.median_low(fmax.values())
-            seed = next(seed for seed in seeds if fmax[seed] == median)
-            path = _path(reports[seed], _Names(harness, folder, seed))
-    return Measurement(
-        **counts,
-        cells=dict(sorted(cells.items())),
-        logic_cells=used[fpga.logic],
-        fmax=fmax,
-        path=path,
-        problem=problem,
-    )
+            return replace(measured, problem=str(error))
+        reports = {seed: _json(folder / f"report-{seed}.json") for seed in seeds}
+        measured = replace(measured, fmax={seed: _fmax(reports[seed]) for seed in seeds})
+        seed = next(seed for seed in seeds if measured.fmax[seed] == measured.median)
+        return replace(measured, path=_path(reports[seed], _Names(harness, folder, seed)))
 
 
 def _json(file: Path) -> Any:
