@@ -51,7 +51,7 @@ class ExactLine(Part):
     more axes every axis is one, also the one that leads, and the names end in its letter.
 
     Latency: the first step of a block that is accepted in clock 0 waits from clock 7 on, with a > 2
-    axes from clock a + 6 on, if nothing is before it. ``done`` follows the last step by a clock.
+    axes from clock a + 5 on, if nothing is before it. ``done`` follows the last step by a clock.
 
     Throughput: a step a clock, and one clock between the last step of a block and the first one of
     the next, however short they are (with a > 2 axes blocks come every a + 2 clocks at best). A

@@ -19,6 +19,7 @@ from discreta.hdl.conic import MAX_WIDTH as CONIC_MAX_WIDTH
 from discreta.hdl.conic import ORDERS as CONIC_ORDERS
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import MAX_WIDTH, Part
+from discreta.hdl.exact_line import ExactLine
 from discreta.hdl.linear import Linear
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
 from discreta.hdl.two_stage import two_stage_circular, two_stage_linear
@@ -28,6 +29,7 @@ from discreta.sim.golden.carrier_linear import CarrierLinear as GoldenCarrierLin
 from discreta.sim.golden.circular import Circular as GoldenCircular
 from discreta.sim.golden.comparison import Comparison as GoldenComparison
 from discreta.sim.golden.conic import Conic as GoldenConic
+from discreta.sim.golden.exact_line import ExactLine as GoldenExactLine
 from discreta.sim.golden.linear import Linear as GoldenLinear
 from discreta.sim.golden.two_stage import TwoStage as GoldenTwoStage
 from discreta.sim.golden.two_stage import two_stage_circular as golden_two_stage_circular
@@ -151,6 +153,12 @@ def _linear_clocks(golden: GoldenLinear, blocks: np.ndarray) -> np.ndarray:
 def _linear_bound(golden: GoldenLinear) -> float:
     """Half a step, or less than one, on every axis but along the line: √a / 2 and √(a − 1)."""
     return math.sqrt(golden.axes) / 2 if golden.preload == "half" else math.sqrt(golden.axes - 1)
+
+
+def _exact_line_clocks(golden: GoldenExactLine, blocks: np.ndarray) -> np.ndarray:
+    """One for every step of the longest axis, and what stands around them."""
+    ways = np.abs(blocks[:, golden.axes :] - blocks[:, : golden.axes])
+    return np.max(ways, axis=1) + golden.axes + 8
 
 
 def _comparison_clocks(_: GoldenComparison, blocks: np.ndarray) -> np.ndarray:
@@ -290,6 +298,20 @@ _CARRIER_ARC_SETTINGS: dict[str, dict[str, Any]] = {
 METHODS = {
     method.name: method
     for method in (
+        Method(
+            name="exact_line",
+            curve="line",
+            summary="line in 2 to 6 axes by the nearest points of the grid, looking a step ahead",
+            error_bound="½ on every axis",
+            clocks_per_step="1",
+            device=ExactLine,
+            golden=GoldenExactLine,
+            axes=(2, 3, 4, 5, 6),
+            choices={},
+            settings={"default": {}},
+            clocks=_exact_line_clocks,
+            bound=lambda golden: math.sqrt(golden.axes - 1) / 2,
+        ),
         Method(
             name="linear",
             curve="line",
