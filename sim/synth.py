@@ -55,8 +55,8 @@ RUNS = 3 + len(SEEDS)
 #: MHz asked for: more than any core reaches, so that nextpnr never rests.
 _TARGET = 400
 
-#: The file with the places of pins.
-_PINS = "pins.cst"
+#: The files with what an FPGA has of cells of its own, and of places of pins.
+_MAP, _PINS = "map.v", "pins.cst"
 
 #: Seconds between two looks at what runs.
 _POLL = 0.02
@@ -87,6 +87,8 @@ class Fpga:
         flip-flop. On iCE40 every flip-flop takes one.
     cells : dict of str to str
         Regular expressions of the types of cells to count, by what is counted.
+    map : str
+        Verilog modules that stand for cells in the end, as Yosys' ``techmap`` takes them.
     pins : str
         Places of the harness's pins, for a nextpnr that chooses none, in its own words.
     """
@@ -98,8 +100,35 @@ class Fpga:
     options: tuple[str, ...]
     logic: str
     cells: dict[str, str]
+    map: str = ""
     pins: str = ""
 
+
+# nextpnr knows the delays of Gowin's LUT4 alone: what goes through a smaller one it takes for no
+# path at all, and may find a clock of more than twice the real one.
+_LUT4 = """
+(* techmap_celltype = "LUT1" *)
+module lut1 (input I0, output F);
+    parameter INIT = 2'b0;
+    LUT4 #(.INIT({8{INIT[1:0]}})) _TECHMAP_REPLACE_ (
+        .I0(I0), .I1(1'b0), .I2(1'b0), .I3(1'b0), .F(F)
+    );
+endmodule
+(* techmap_celltype = "LUT2" *)
+module lut2 (input I0, I1, output F);
+    parameter INIT = 4'b0;
+    LUT4 #(.INIT({4{INIT[3:0]}})) _TECHMAP_REPLACE_ (
+        .I0(I0), .I1(I1), .I2(1'b0), .I3(1'b0), .F(F)
+    );
+endmodule
+(* techmap_celltype = "LUT3" *)
+module lut3 (input I0, I1, I2, output F);
+    parameter INIT = 8'b0;
+    LUT4 #(.INIT({2{INIT[7:0]}})) _TECHMAP_REPLACE_ (
+        .I0(I0), .I1(I1), .I2(I2), .I3(1'b0), .F(F)
+    );
+endmodule
+"""
 
 _HX8K = Fpga(
     name="hx8k",
@@ -146,17 +175,18 @@ DEVICES = {
         Fpga(
             name="gw1n-9",
             title="Gowin GW1NR-9",
-            synthesis="synth_gowin -family gw1n",
+            synthesis="synth_gowin -family gw1n -nowidelut",
             place="himbaechel_gowin",
             options=("--device", "GW1NR-LV9QN88PC6/I5", "--vopt", "family=GW1N-9C"),
             logic="LUT4",
             cells={
-                "luts": "LUT[1-4]",
+                "luts": "LUT4",
                 "carries": "ALU",
                 "multipliers": "MULT.*|ALU54D",
                 "memories": "(DP|SDP|SP|ROM|DPX9|SDPX9|SPX9|ROMX9)B?",
                 "flip_flops": "DFF.*",
             },
+            map=_LUT4,
             pins='IO_LOC "clk" 52;\nIO_LOC "d" 25;\nIO_LOC "q" 26;\n',
         ),
     )
@@ -278,6 +308,7 @@ def measure(
         write = Path(folder, "harness.il").write_text
         write(rtlil.convert(harness, ports=pins, name="harness", emit_src=False))
         Path(folder, "core.il").write_text(rtlil.convert(top, name="core", emit_src=False))
+        Path(folder, _MAP).write_text(fpga.map)
         Path(folder, _PINS).write_text(fpga.pins)
         run = _Runner(folder, workers, progress)
         run(*(_synthesize(fpga, module) for module in ("core", "harness")))
@@ -322,6 +353,7 @@ def _synthesize(fpga: Fpga, module: str) -> list[str]:
         f"{command} -run begin:map_ffs",
         "rename -wire t:$_*DFF*_",
         f"{command} -run map_ffs:",
+        f"techmap -map {_MAP}",
         *(["delete -port x:*", "delete t:?BUF"] if module == "core" else []),
         f"write_json {module}.json",
     )

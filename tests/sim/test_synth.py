@@ -87,6 +87,15 @@ def test_a_method():
 
 
 @needs_boards
+def test_on_gowin_no_path_is_overlooked():
+    measured = measure(Linear(4), "gw1n-9", (1,), workers=2)
+    assert measured.luts == measured.cells["LUT4"] > 0
+    # nextpnr knows no delay of these, and leaves out what goes through them.
+    assert not measured.cells.keys() & {"LUT1", "LUT2", "LUT3"}
+    assert path_of(measured).levels > 2
+
+
+@needs_boards
 def test_the_same_again_whatever_runs_at_once():
     went = []
     measured = measure(
