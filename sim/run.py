@@ -224,7 +224,7 @@ def run(
             write_view(view, vcd_part, Path(vcd).name, shown)
         if plot_part:
             chosen = say_choices({name: core.parameters[name] for name in method.choices})
-            picture.save(plot_part, kind, f"{pictured}, {chosen}")
+            picture.save(plot_part, kind, ", ".join(filter(None, (pictured, chosen))))
         if json_file:
             json.dump(summary, json_file, indent=2)
             json_file.write("\n")
