@@ -1393,7 +1393,7 @@ def measured(monkeypatch):
         monkeypatch.setattr(speeds, name, partial(getattr(speeds, name), **sample))
 
 
-@pytest.mark.usefixtures("compiled_engine", "measured")
+@pytest.mark.usefixtures("optimized_engine", "measured")
 def test_feed_prints_the_speed_along_the_path_and_the_accuracy(discreta):
     code, out, err = discreta("feed")
     assert (code, err) == (0, "")
@@ -1428,7 +1428,7 @@ def test_limits_of_a_clock(discreta):
     assert rows["carrier_linear"][-2:] == ["-", "-"]
 
 
-@pytest.mark.usefixtures("compiled_engine")
+@pytest.mark.usefixtures("optimized_engine")
 def test_a_short_stress(discreta):
     code, out, err = discreta("stress", "--blocks", "200", "--seed", "3")
     assert (code, err) == (0, "")
@@ -1438,7 +1438,7 @@ def test_a_short_stress(discreta):
 def test_measurements_without_a_compiler(discreta, monkeypatch):
     monkeypatch.setattr(cli, "default_engine", lambda: "pysim")
     message = "discreta: this needs the compiled engine: install a C++ compiler\n"
-    for command in ("feed", "limits", "stress"):
+    for command in ("feed", "limits", "stress", "compare"):
         assert discreta(command) == (2, "", message)
 
 

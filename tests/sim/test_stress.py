@@ -10,7 +10,6 @@ from amaranth.lib.wiring import In
 
 from discreta.hdl.contract import Part
 from discreta.hdl.device import Device
-from discreta.sim import compiled
 from discreta.sim.stress import Report, make_device, stress
 
 #: How many blocks a good run has, and how many are enough to find what is broken.
@@ -42,13 +41,6 @@ def amend(part: Part, change: Callable[[Module], None]) -> None:
         return m
 
     part.elaborate = elaborate
-
-
-@pytest.fixture
-def optimized():
-    """Have the compiled engine as it is: unoptimized, this device is 40 times as slow."""
-    if compiled.compiler() is None:
-        pytest.skip("no C++ compiler (c++, g++, clang++ or $CXX)")
 
 
 class Faulty(Part):
@@ -117,7 +109,7 @@ def run(blocks: int, seed: int, fault: int = 0) -> Report:
     return stress(blocks, seed=seed, workers=1, make=make_faulty, inputs={"fault": fault})
 
 
-@pytest.mark.usefixtures("optimized")
+@pytest.mark.usefixtures("optimized_engine")
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_run_is_good_and_meets_everything(seed):
     told = []
@@ -143,7 +135,7 @@ def test_a_run_is_good_and_meets_everything(seed):
     assert rows["blocks"] == f"{report.blocks:,}"
 
 
-@pytest.mark.usefixtures("optimized")
+@pytest.mark.usefixtures("optimized_engine")
 @pytest.mark.parametrize(("fault", "said"), [(n, said) for n, (_, said) in FAULTS.items()])
 def test_a_broken_device_is_caught(fault, said):
     report = run(ENOUGH, seed=3, fault=fault)
@@ -153,7 +145,7 @@ def test_a_broken_device_is_caught(fault, said):
     assert all("\n" not in text for text in report.differences)
 
 
-@pytest.mark.usefixtures("optimized")
+@pytest.mark.usefixtures("optimized_engine")
 def test_the_same_seed_gives_the_same_run():
     first, second = run(100, seed=5), run(100, seed=5)
     second.seconds = first.seconds
