@@ -82,7 +82,7 @@ class ExactArc:
             names = ("empty", "swap", "negative_x", "negative_y")
             kinds |= {f"{stage}_{name}": (1, False) for name in names}
             kinds |= {f"{stage}_turns": (TURNS_BITS, False)} | self._ends(stage)
-            kinds |= {f"{stage}_{a}": (n, False) for a in "xy"}
+            kinds |= {f"{stage}_x": (n + 1, True), f"{stage}_y": (n, False)}
         return kinds | {"ready_diagonal": (n + 2, True), "ready_unit": (1, False)}
 
     def _ends(self, stage: str) -> dict[str, tuple[int, bool]]:
@@ -166,11 +166,9 @@ class ExactArc:
         after = self._sums(state, ends)
         final_next = final | (turn & equal(state["turns"], 1))
         second_next = second ^ (steps & changes)
-        after["mode"] = where(
-            goes & prepares,
-            CHANGE,
-            where(loading | goes, self._next_mode(after, second_next, final_next, unit), STEP),
-        )
+        sums = [after.pop(name) for name in ("new_axial", "new_diagonal")]
+        next_mode = self._next_mode(*sums, second_next, final_next | unit)
+        after["mode"] = where(goes & prepares, CHANGE, where(loading | goes, next_mode, STEP))
         after["second"] = second_next
         after["odd"] = state["diagonal"] & 1
         after["turns"] = (state["turns"] - turn) & (2**TURNS_BITS - 1)
@@ -214,7 +212,7 @@ class ExactArc:
         # In octant 1 with Y − X = −2 or −1 the change adds E's own difference Y − X + 2 on the
         # axial step. On the axis itself the diagonal step adds 1.
         by = where(changes, diagonal, where(octant_next, -1, where(axis_next, ~diagonal, axial)))
-        more = where(loading, second, where(to_second, goes_diagonal, 1))
+        more = where(to_second, goes_diagonal, negate(loading))
         new_axial = by + (state["load_axial"] | axis_next) + more
         by = where(changes, axial, where(octant_next, ~axial, where(axis_next, -1, diagonal)))
         more = where(
@@ -238,20 +236,24 @@ class ExactArc:
         new_low = where(loading, state["load_f"] & 1, (low + extra) & 1)
         new_f = 2 * self._signed(half, n + 2) + new_low
 
-        held = state["unit"] & negate(state["final"]) & state["running"]
-        idle = negate(state["running"]) & negate(loading)
-        keeps = held | idle
+        new_axial = self._signed(new_axial, n + 2)
+        new_diagonal = self._signed(new_diagonal, n + 2)
+        # Of radius 1 a quarter is one step: (1, 0) is where it begins and, turned, where it ends.
+        frozen = state["unit"] & negate(state["final"])
+        keeps = negate(loading | (state["running"] & negate(frozen)))
         prepares = octant_next | axis_next
         return {
             "f": where(ends, 0, where(keeps | prepares, f, new_f)),
-            "axial": where(ends, 1, where(keeps, axial, self._signed(new_axial, n + 2))),
-            "diagonal": where(ends, 0, where(keeps, diagonal, self._signed(new_diagonal, n + 2))),
+            "axial": where(ends, 1, where(keeps, axial, new_axial)),
+            "diagonal": where(ends, 0, where(keeps, diagonal, new_diagonal)),
+            "new_axial": new_axial,
+            "new_diagonal": new_diagonal,
         }
 
-    def _next_mode(self, after: State, second: Value, final: Value, unit: Value) -> Value:
+    def _next_mode(self, axial: Value, diagonal: Value, second: Value, stays: Value) -> Value:
         """Give what the next clock is for, from what is then in the registers."""
-        octant = negate(second) & negate(less(after["diagonal"], 0))
-        axis = second & negate(less(after["axial"], 0)) & negate(final) & negate(unit)
+        octant = negate(second) & negate(less(diagonal, 0))
+        axis = second & negate(less(axial, 0)) & negate(stays)
         return where(octant, OCTANT_NEXT, where(axis, AXIS_NEXT, STEP))
 
     def _begin(self, state: State, after: State, begin: Value) -> State:
@@ -259,8 +261,8 @@ class ExactArc:
         n = self.width
         x, y, diagonal = state["ready_x"], state["ready_y"], state["ready_diagonal"]
         second = negate(less(diagonal, 0))
-        axial = where(second, ~x, y)
-        f = diagonal + axial + second + where(second, 2 ** (n + 2), 0)
+        axial = where(second, x, y)
+        f = diagonal + axial + where(second, 2 ** (n + 2), 0)
         begun = {
             "second": second,
             # In octant 1 Y leads, and Y is the machine's y unless they are exchanged.
@@ -296,8 +298,8 @@ class ExactArc:
         after |= {name: where(leave, value, state[name]) for name, value in seen.items()}
         names = [name for name in self.prepared_registers() if name.startswith("ready_")]
         ready = {name: state[name.replace("ready", "seen")] for name in names[1:-2]}
-        ready["ready_diagonal"] = state["seen_y"] - state["seen_x"] + 1
-        ready["ready_unit"] = equal(state["seen_x"], 1) & equal(state["seen_y"], 0)
+        ready["ready_diagonal"] = state["seen_y"] + state["seen_x"] + 1
+        ready["ready_unit"] = equal(state["seen_x"], -1) & equal(state["seen_y"], 0)
         return after | {name: where(follow, value, state[name]) for name, value in ready.items()}
 
     def _receive(self, inputs: dict[str, Value]) -> State:
@@ -344,7 +346,6 @@ class ExactArc:
 
     def _see(self, state: State) -> State:
         """Stage 2: the start in its quadrant, and how many axes are crossed."""
-        low = 2**self.width - 1
         clockwise = state["clockwise"]
         first = state["quadrant"]
         swap = first & 1
@@ -366,8 +367,8 @@ class ExactArc:
             "negative_x": negative["x"],
             "negative_y": negative["y"],
             "turns": 4 * (state["full_turns"] + round_) + crossings,
-            "x": where(state["minus_x"], 0 - x, x) & low,
-            "y": where(state["minus_y"], 0 - y, y) & low,
+            "x": self._signed(where(state["minus_x"], x, 0 - x), self.width + 1),
+            "y": where(state["minus_y"], 0 - y, y) & (2**self.width - 1),
             **{name[6:]: state[name] for name in self._ends("first")},
         }
         return {f"seen_{name}": value for name, value in seen.items()}
