@@ -1,6 +1,6 @@
 """The exact arc interpolator: the sign of the circle's own residual chooses every step."""
 
-from amaranth import Cat, Const, Module, Mux, Signal, Value
+from amaranth import Cat, Const, Module, Mux, ResetSignal, Signal, Value
 from amaranth.hdl import signed, unsigned
 from amaranth.lib import stream
 from amaranth.lib.wiring import In, Out
@@ -24,7 +24,7 @@ class ExactArcInput(Part):
     so whether the end is on the circle, and whether the arc stays in the coordinates there are, is
     not looked at.
 
-    1. ``from`` and ``to`` = start and end seen from the centre, ``first_left`` = end − start; in the
+    1. ``from`` and ``to`` = start and end seen from the centre, ``first_past`` = end − start; in the
        clock after that the quadrants, the signs and what is too far (``coded``).
     2. ``seen_x``, ``seen_y`` = XH, YH; the crossings, the fault and the directions.
     3. ``ready_diagonal`` = YH − XH + 1.
@@ -66,7 +66,7 @@ class ExactArcInput(Part):
                 "still": Out(1),
                 "fault": Out(ErrorCode),
                 "empty": Out(1),
-                "left": Out(way),
+                "past": Out(way),
                 "end": Out(point_layout(width, 2)),
                 "negative": Out(flags),
                 "turns": Out(TURNS_BITS),
@@ -90,7 +90,7 @@ class ExactArcInput(Part):
         self.coded = register("coded")
         self.seen_from = {a: register(f"from_{a}", way_shape) for a in "xy"}
         self.seen_to = {a: register(f"to_{a}", way_shape) for a in "xy"}
-        self.first_left = {a: register(f"first_left_{a}", way_shape) for a in "xy"}
+        self.first_past = {a: register(f"first_past_{a}", way_shape) for a in "xy"}
         self.first_end = {a: register(f"first_end_{a}", end_shape) for a in "xy"}
         self.clockwise = register("clockwise")
         self.full_turns = register("full_turns", FULL_TURNS_BITS)
@@ -108,7 +108,7 @@ class ExactArcInput(Part):
                 register(f"{stage}_{name}")
             register(f"{stage}_turns", TURNS_BITS)
             for a in "xy":
-                register(f"{stage}_left_{a}", way_shape)
+                register(f"{stage}_past_{a}", way_shape)
             for a in "xy":
                 register(f"{stage}_end_{a}", end_shape)
             register(f"{stage}_x", end_shape)
@@ -147,12 +147,13 @@ class ExactArcInput(Part):
             for a in "xy":
                 m.d.sync += [
                     self.seen_from[a].eq(block.start[a] - block.center[a]),
-                    self.seen_to[a].eq(block.end[a] - block.center[a]),
-                    self.first_left[a].eq(block.end[a] - block.start[a]),
+                    # Complemented, so that it is subtracted without inverters.
+                    self.seen_to[a].eq(~(block.end[a] - block.center[a])),
                     self.first_end[a].eq(block.end[a]),
                 ]
         start = _Seen(m, "start", self.seen_from, self.clockwise, n)
-        finish = _Seen(m, "finish", self.seen_to, self.clockwise, n)
+        to = {a: (~self.seen_to[a]).as_signed() for a in "xy"}
+        finish = _Seen(m, "finish", to, self.clockwise, n)
         first, last = Signal(2, name="first"), Signal(2, name="last")
         with m.If(start.right & ~start.below):
             m.d.comb += first.eq(0)
@@ -176,7 +177,11 @@ class ExactArcInput(Part):
                 self.end_quadrant.eq(last),
                 self.minus["x"].eq(Mux(first[0], self.seen_from["y"][-1], self.seen_from["x"][-1])),
                 self.minus["y"].eq(Mux(first[0], self.seen_from["x"][-1], self.seen_from["y"][-1])),
-                *[self.stands[a].eq(self.first_left[a] == 0) for a in "xy"],
+                *[self.stands[a].eq((self.seen_from[a] ^ self.seen_to[a]).all()) for a in "xy"],
+                *[
+                    self.first_past[a].eq(_sum(self.seen_from[a], self.seen_to[a], Const(1, 1)))
+                    for a in "xy"
+                ],
                 self.too_far.eq(start.too_far | finish.too_far),
                 self.at_center.eq(start.center),
                 self.to_center.eq(finish.center),
@@ -189,7 +194,7 @@ class ExactArcInput(Part):
         }
         crossings, once_round = Signal(2), Signal()
         wrong = Cat(
-            ~self.stands[a] & (self.first_left[a][-1] ^ negative[a]) for a in "xy"
+            ~self.stands[a] & ~(self.first_past[a][-1] ^ negative[a]) for a in "xy"
         )
         m.d.comb += [
             crossings.eq(self.end_quadrant - self.quadrant),
@@ -197,6 +202,13 @@ class ExactArcInput(Part):
                 (crossings == 0) & (wrong.any() | (self.stands["x"] & self.stands["y"]))
             ),
         ]
+        # −X and Y, whatever the signs.
+        flips = {"x": ~self.minus["x"], "y": self.minus["y"]}
+        away: dict[str, Signal] = {}
+        for a, other, bits in (("x", "y", n + 1), ("y", "x", n)):
+            away[a] = Signal(bits, name=f"away_{a}")
+            side = Mux(self.quadrant[0], self.seen_from[other], self.seen_from[a])
+            m.d.comb += away[a].eq(side[:bits] ^ flips[a].replicate(bits))
         with m.If(leave):
             m.d.sync += [
                 r["seen_fault"].eq(
@@ -212,17 +224,11 @@ class ExactArcInput(Part):
                 r["seen_swap"].eq(self.quadrant[0]),
                 r["seen_turns"].eq(Cat(crossings, self.full_turns + once_round)),
             ]
-            for a, other in ("xy", "yx"):
-                # −X and Y, whatever the signs.
-                flips = self.minus["y"] if a == "y" else ~self.minus["x"]
-                bits = n if a == "y" else n + 1
-                side = Mux(self.quadrant[0], self.seen_from[other], self.seen_from[a])
-                away = Signal(bits, name=f"away_{a}")
-                m.d.comb += away.eq(side[:bits] ^ flips.replicate(bits))
+            for a in "xy":
                 m.d.sync += [
-                    r[f"seen_{a}"].eq(_sum(away, Const(0, bits), flips)),
+                    r[f"seen_{a}"].eq(_sum(away[a], Const(0, 1), flips[a])),
                     r[f"seen_negative_{a}"].eq(negative[a]),
-                    r[f"seen_left_{a}"].eq(self.first_left[a]),
+                    r[f"seen_past_{a}"].eq(self.first_past[a]),
                     r[f"seen_end_{a}"].eq(self.first_end[a]),
                 ]
 
@@ -258,7 +264,7 @@ class ExactArcInput(Part):
         ]
         for a in "xy":
             m.d.comb += [
-                self.left[a].eq(r[f"ready_left_{a}"]),
+                self.past[a].eq(r[f"ready_past_{a}"]),
                 self.end[a].eq(r[f"ready_end_{a}"]),
                 self.negative[a].eq(r[f"ready_negative_{a}"]),
             ]
@@ -290,9 +296,9 @@ class ExactArc(Part):
         self.input = ExactArcInput(width)
 
         way_shape, end_shape = signed(width + 2), signed(width + 1)
-        self.f = Signal(signed(width + 3))
-        self.axial = Signal(way_shape, init=1)
-        self.diagonal = Signal(way_shape)
+        self.f = Signal(signed(width + 3), reset_less=True)
+        self.axial = Signal(way_shape, init=1, reset_less=True)
+        self.diagonal = Signal(way_shape, reset_less=True)
         self.mode = Signal(2)
         self.second = Signal()
         self.odd = Signal()
@@ -301,9 +307,10 @@ class ExactArc(Part):
         self.unit = Signal()
         self.lead = Signal()
         self.negative = {a: Signal(name=f"negative_{a}") for a in "xy"}
-        self.left = {a: Signal(way_shape, name=f"ko{a}") for a in "xy"}
+        self.past = {a: Signal(way_shape, name=f"ko{a}") for a in "xy"}
         self.end = {a: Signal(end_shape, name=f"{a}k") for a in "xy"}
         self.near = Signal()
+        self.lost = Signal()
         self.running = Signal()
         self.loading = Signal()
         self.done_register = Signal(name="done")
@@ -312,10 +319,10 @@ class ExactArc(Part):
         self.pulse = {a: Signal(name=f"pulse_{a}") for a in "xy"}
         self.direction = {a: Signal(name=f"direction_{a}") for a in "xy"}
         self.last = Signal()
-        self.load_f = Signal(signed(width + 3))
-        self.load_axial = Signal(way_shape)
-        self.load_diagonal = Signal(way_shape)
-        self.load_left = {a: Signal(way_shape, name=f"load_left_{a}") for a in "xy"}
+        self.load_f = Signal(signed(width + 3), reset_less=True)
+        self.load_axial = Signal(way_shape, reset_less=True)
+        self.load_diagonal = Signal(way_shape, reset_less=True)
+        self.load_past = {a: Signal(way_shape, name=f"load_past_{a}") for a in "xy"}
         self.load_end = {a: Signal(end_shape, name=f"load_end_{a}") for a in "xy"}
         #: 1 in the clock in which the next step is decided and nothing keeps it.
         self.entering = Signal()
@@ -327,15 +334,18 @@ class ExactArc(Part):
                 *(self.turns, self.final, self.unit, self.lead),
                 *self.negative.values(),
             ],
-            "KOX, KOY steps left": list(self.left.values()),
+            "KOX, KOY steps left": list(self.past.values()),
             "XK, YK end": list(self.end.values()),
-            "УУ": [self.near, self.running, self.loading, self.done_register, self.error_register],
+            "УУ": [
+                *(self.near, self.lost, self.running, self.loading),
+                *(self.done_register, self.error_register),
+            ],
             "step that waits": [
                 *(self.waiting, *self.pulse.values(), *self.direction.values(), self.last),
             ],
             "block to load": [
                 *(self.load_f, self.load_axial, self.load_diagonal),
-                *self.load_left.values(),
+                *self.load_past.values(),
                 *self.load_end.values(),
             ],
             "prepared blocks": list(self.input.registers.values()),
@@ -358,6 +368,9 @@ class ExactArc(Part):
         goes_on, frozen, turn, to_second, leads = (
             Signal(name=name) for name in ("goes_on", "frozen", "turn", "to_second", "leads")
         )
+        # What is set to a constant, too, is reset with that: it spares gates.
+        rst = ResetSignal()
+        moves = self.loading | (self.running & ~frozen)
         prepares, changes = self.mode[1], self.mode == CHANGE
         # The sign of E is kept the other way round while X leads.
         slanted = ~self.f[-1]
@@ -380,11 +393,12 @@ class ExactArc(Part):
             begin.eq(inp.pending & ~inp.still & (idle | (self.running & self.near))),
             to_second.eq(changes & ~self.second),
             frozen.eq(self.unit & ~self.final),
-            goes_on.eq(self.running & ~(self.near | missed)),
-            ends.eq(self.running & (self.near | missed)),
-            step.eq(self.running & (self.near | ~(prepares | missed))),
-            turn.eq(step & ((changes & self.second) | frozen)),
-            leads.eq(step & (to_second | frozen)),
+            goes_on.eq(self.running & ~(self.near | self.lost)),
+            missed.eq(self.running & self.lost & ~self.near),
+            ends.eq(self.running & (self.near | self.lost)),
+            step.eq(self.running & (self.near | ~(prepares | self.lost))),
+            turn.eq((changes & self.second) | (frozen & self.running)),
+            leads.eq(to_second | (frozen & self.running)),
             self.entering.eq(step & free),
         ]
 
@@ -403,20 +417,11 @@ class ExactArc(Part):
                 _sum(self.f[1:], Cat(addend[:-1], addend[-1] ^ changes), carry)
             ),
         ]
-        with m.If(free):
-            with m.If(ends):
-                m.d.sync += self.f.eq(0)
-            with m.Elif((self.loading | (self.running & ~frozen)) & ~prepares):
-                m.d.sync += self.f.eq(
-                    Cat(
-                        Mux(
-                            self.loading,
-                            self.load_f[0],
-                            self.f[0] ^ Mux(to_second, slanted ^ self.odd, 1),
-                        ),
-                        half,
-                    )
-                )
+        low = Mux(
+            self.loading, self.load_f[0], self.f[0] ^ Mux(to_second, slanted ^ self.odd, 1)
+        )
+        with m.If(rst | (free & moves & (ends | ~prepares))):
+            m.d.sync += self.f.eq(Mux(rst | ends, 0, Cat(low, half)))
 
         # What it grows by. Each takes over the other, or its complement, where the octant changes.
         new_axial, new_diagonal = Signal(signed(n + 2)), Signal(signed(n + 2))
@@ -461,28 +466,30 @@ class ExactArc(Part):
                 )
             ),
         ]
-        with m.If(free):
-            with m.If(ends):
+        with m.If(rst | (free & moves)):
+            with m.If(rst | ends):
                 m.d.sync += [self.axial.eq(1), self.diagonal.eq(0)]
-            with m.Elif(self.loading | (self.running & ~frozen)):
+            with m.Else():
                 m.d.sync += [self.axial.eq(new_axial), self.diagonal.eq(new_diagonal)]
 
         # Where the octant changes next, from what the registers come to.
         next_second, next_final = Signal(), Signal()
-        octant_next, axis_next = Signal(), Signal()
+        may_octant, may_axis, changing = Signal(), Signal(), Signal()
+        goes_now = Signal()
         m.d.comb += [
-            next_second.eq(self.second ^ (step & changes)),
+            next_second.eq(self.second ^ changes),
             next_final.eq(self.final | (turn & (self.turns == 1))),
-            octant_next.eq(~next_second & ~new_diagonal[-1]),
-            axis_next.eq(next_second & ~new_axial[-1] & ~next_final & ~self.unit),
+            goes_now.eq(self.loading | goes_on),
+            changing.eq(goes_on & prepares),
+            may_octant.eq(goes_now & ~changing & ~next_second),
+            may_axis.eq(goes_now & ~changing & next_second & ~next_final & ~self.unit),
         ]
         with m.If(free):
-            with m.If(goes_on & prepares):
-                m.d.sync += self.mode.eq(CHANGE)
-            with m.Elif(self.loading | goes_on):
-                m.d.sync += self.mode.eq(Cat(axis_next, octant_next | axis_next))
-            with m.Else():
-                m.d.sync += self.mode.eq(STEP)
+            # The signs are known last.
+            axis_next = may_axis & ~new_axial[-1]
+            m.d.sync += self.mode.eq(
+                Cat(axis_next | changing, (may_octant & ~new_diagonal[-1]) | axis_next)
+            )
             m.d.sync += self.odd.eq(self.diagonal[0])
             with m.If(begin):
                 m.d.sync += [
@@ -492,9 +499,6 @@ class ExactArc(Part):
                     self.final.eq(inp.turns == 0),
                     self.unit.eq(inp.unit),
                     *[self.negative[a].eq(inp.negative[a]) for a in "xy"],
-                    self.load_f.eq(inp.residual),
-                    self.load_axial.eq(inp.axial),
-                    self.load_diagonal.eq(inp.diagonal),
                 ]
             with m.Else():
                 m.d.sync += [
@@ -504,12 +508,18 @@ class ExactArc(Part):
                     # What rose falls now: that axis which does not lead.
                     self.negative["x"].eq(self.negative["x"] ^ (turn & self.lead)),
                     self.negative["y"].eq(self.negative["y"] ^ (turn & ~self.lead)),
-                    self.load_f.eq(0),
-                    self.load_axial.eq(0),
-                    self.load_diagonal.eq(0),
                 ]
                 with m.If(turn):
                     m.d.sync += self.turns.eq(self.turns - 1)
+        loads = [
+            (self.load_f, inp.residual),
+            (self.load_axial, inp.axial),
+            (self.load_diagonal, inp.diagonal),
+        ]
+        with m.If(rst | free):
+            for register, value in loads:
+                m.d.sync += register.eq(Mux(rst | ~begin, 0, value))
+        with m.If(free):
             m.d.sync += [
                 self.loading.eq(begin),
                 self.running.eq(self.loading | goes_on),
@@ -520,43 +530,45 @@ class ExactArc(Part):
         # The way to the end: of the steps that are put out in the registers, and of the next one.
         close, back = Signal(2), Signal(2)
         for index, a in enumerate("xy"):
-            left, pulse, direction = self.left[a], self.pulse[a], self.direction[a]
+            past, pulse, direction = self.past[a], self.pulse[a], self.direction[a]
             way = self.negative[a]
             moves = slanted | (self.lead if a == "y" else ~self.lead)
             counted = Signal(n + 2, name=f"counted_{a}")
             here, rest = Signal(3, name=f"here_{a}"), Signal(3, name=f"rest_{a}")
             few, about = Signal(name=f"few_{a}"), Signal(name=f"about_{a}")
-            less = pulse & ~direction
+            less = pulse & direction
             m.d.comb += [
-                counted.eq(_sum(left, less.replicate(n + 2), pulse & direction)),
-                here.eq(_without(left[:3], pulse, direction)),
-                few.eq(_few(left)),
+                counted.eq(_sum(past, less.replicate(n + 2), pulse & ~direction)),
+                here.eq(_moved(past[:3], pulse, direction)),
+                few.eq(_few(past)),
             ]
             next_pulse = step & moves
             m.d.comb += [
                 rest.eq(
-                    Mux(self.loading, self.load_left[a][:3], _without(here, next_pulse, way))
+                    Mux(self.loading, self.load_past[a][:3], _moved(here, next_pulse, way))
                 ),
                 about.eq((rest == 0) | (rest == 1) | (rest == 7)),
-                close[index].eq(about & Mux(self.loading, _few(self.load_left[a]), few)),
-                back[index].eq(~few & (left[-1] ^ way)),
+                close[index].eq(about & Mux(self.loading, _few(self.load_past[a]), few)),
+                back[index].eq(~few & ~(past[-1] ^ way)),
                 self.steps.payload[a].eq(Cat(pulse, pulse & direction)),
-                self.position[a].eq(self.end[a] - left),
+                self.position[a].eq(self.end[a] + past),
             ]
             with m.If(free):
                 m.d.sync += [
-                    self.load_left[a].eq(inp.left[a]),
+                    self.load_past[a].eq(inp.past[a]),
                     self.load_end[a].eq(inp.end[a]),
-                    left.eq(Mux(self.loading, self.load_left[a], counted)),
+                    past.eq(Mux(self.loading, self.load_past[a], counted)),
                     pulse.eq(step & Mux(self.near, here[0], moves)),
-                    direction.eq(Mux(self.near, here[1], way)),
+                    direction.eq(Mux(self.near, ~here[1], way)),
                 ]
                 with m.If(self.loading):
                     m.d.sync += self.end[a].eq(self.load_end[a])
-        at_axis = self.second & ~self.axial[-1] & self.axial[0]
-        m.d.comb += missed.eq(self.running & self.final & ~self.near & (at_axis | back.any()))
+        to_axis = self.second & ~self.axial[-1]
         with m.If(free):
-            m.d.sync += self.near.eq((self.loading | goes_on) & next_final & close.all())
+            m.d.sync += [
+                self.near.eq(goes_now & next_final & close.all()),
+                self.lost.eq(goes_on & self.final & (to_axis | back.any())),
+            ]
 
         m.d.sync += [
             self.done_register.eq(
@@ -612,9 +624,9 @@ def _few(value: Value) -> Value:
     return (value[2:].all()) | ~(value[2:].any())
 
 
-def _without(value: Value, pulse: Value, negative: Value) -> Value:
-    """Take a step off a number of three bits."""
-    low, mid = value[0] ^ negative ^ 1, value[1] ^ negative ^ 1
+def _moved(value: Value, pulse: Value, negative: Value) -> Value:
+    """Add a step to a number of three bits."""
+    low, mid = value[0] ^ negative, value[1] ^ negative
     return Cat(
         value[0] ^ pulse,
         value[1] ^ (pulse & low),

@@ -58,7 +58,7 @@ class ExactArc:
         kinds |= dict.fromkeys(("lead", "negative_x", "negative_y"), (1, False))
         kinds |= dict.fromkeys(("kox", "koy"), (n + 2, True))
         kinds |= dict.fromkeys(("xk", "yk"), (n + 1, True))
-        kinds |= dict.fromkeys(("near", "running", "loading", "done"), (1, False))
+        kinds |= dict.fromkeys(("near", "lost", "running", "loading", "done"), (1, False))
         kinds |= {"error": (2, False)}
         waits = ("waiting", "pulse_x", "pulse_y", "direction_x", "direction_y", "last")
         kinds |= dict.fromkeys(waits, (1, False))
@@ -87,7 +87,7 @@ class ExactArc:
 
     def _ends(self, stage: str) -> dict[str, tuple[int, bool]]:
         """Give a stage's registers for the way to the end and the end."""
-        kinds = {f"{stage}_left_{a}": (self.width + 2, True) for a in "xy"}
+        kinds = {f"{stage}_past_{a}": (self.width + 2, True) for a in "xy"}
         return kinds | {f"{stage}_end_{a}": (self.width + 1, True) for a in "xy"}
 
     def reset(self) -> State:
@@ -110,8 +110,8 @@ class ExactArc:
             "error": state["error"],
         }
         for a in "xy":
-            # KOX is the way from the steps taken to the end.
-            position = state[f"{a}k"] - state[f"ko{a}"]
+            # KOX is how far the steps taken lead past the end.
+            position = state[f"{a}k"] + state[f"ko{a}"]
             out[f"position_{a}"] = self._signed(position, self.width + 1)
             out[f"steps_{a}"] = _move(state[f"pulse_{a}"], state[f"direction_{a}"])
         return out
@@ -150,22 +150,17 @@ class ExactArc:
         changes = equal(mode, CHANGE)
         diagonal = negate(less(state["f"], 0))
 
-        # No axis is left to cross, and the end is behind: it was not on the circle.
-        there = second & negate(less(axial, 0)) & (axial & 1)  # axial is 1 just where X is 0
-        for a in "xy":
-            left = state[f"ko{a}"]
-            back = where(state[f"negative_{a}"], less(BACK - 1, left), less(left, -BACK))
-            there = there | back
-        missed = running & final & negate(near) & there
+        missed = running & state["lost"] & negate(near)
         runs = running & negate(missed)
         ends = (runs & near) | missed
         goes = runs & negate(near)
         steps = runs & (near | negate(prepares))
-        turn = steps & ((changes & second) | (unit & negate(final)))
+        quarter = unit & negate(final) & running
+        turn = (changes & second) | quarter
 
         after = self._sums(state, ends)
         final_next = final | (turn & equal(state["turns"], 1))
-        second_next = second ^ (steps & changes)
+        second_next = second ^ changes
         sums = [after.pop(name) for name in ("new_axial", "new_diagonal")]
         next_mode = self._next_mode(*sums, second_next, final_next | unit)
         after["mode"] = where(goes & prepares, CHANGE, where(loading | goes, next_mode, STEP))
@@ -174,7 +169,7 @@ class ExactArc:
         after["turns"] = (state["turns"] - turn) & (2**TURNS_BITS - 1)
         after["final"] = final_next
         after["unit"] = unit
-        after["lead"] = lead ^ (steps & ((changes & negate(second)) | (unit & negate(final))))
+        after["lead"] = lead ^ ((changes & negate(second)) | quarter)
         # What rose falls now: that axis which does not lead.
         after["negative_x"] = state["negative_x"] ^ (turn & lead)
         after["negative_y"] = state["negative_y"] ^ (turn & negate(lead))
@@ -183,16 +178,23 @@ class ExactArc:
         for a, leads in (("x", negate(lead)), ("y", lead)):
             way = state[f"negative_{a}"]
             pulse = leads | diagonal
-            here = state[f"ko{a}"] - _move(state[f"pulse_{a}"], state[f"direction_{a}"])
-            rest = where(loading, state[f"load_left_{a}"], here - _move(steps & pulse, way))
+            here = state[f"ko{a}"] + _move(state[f"pulse_{a}"], state[f"direction_{a}"])
+            rest = where(loading, state[f"load_past_{a}"], here + _move(steps & pulse, way))
             close = close & less(-2, rest) & less(rest, 2)
             after[f"ko{a}"] = where(
-                loading, state[f"load_left_{a}"], self._signed(here, self.width + 2)
+                loading, state[f"load_past_{a}"], self._signed(here, self.width + 2)
             )
             after[f"{a}k"] = where(loading, state[f"load_end_{a}"], state[f"{a}k"])
             after[f"pulse_{a}"] = steps & where(near, here & 1, pulse)
-            after[f"direction_{a}"] = where(near, (here >> 1) & 1, way)
+            after[f"direction_{a}"] = where(near, negate((here >> 1) & 1), way)
         after["near"] = (loading | goes) & final_next & close
+        # No axis is left to cross, and X is 1 before this step or the end is behind the last one.
+        behind = second & negate(less(axial, 0))
+        for a in "xy":
+            past = state[f"ko{a}"]
+            back = where(state[f"negative_{a}"], less(past, -BACK), less(BACK - 1, past))
+            behind = behind | back
+        after["lost"] = goes & final & behind
         after["waiting"] = steps
         after["last"] = near
         after["running"] = loading | goes
@@ -243,9 +245,9 @@ class ExactArc:
         keeps = negate(loading | (state["running"] & negate(frozen)))
         prepares = octant_next | axis_next
         return {
-            "f": where(ends, 0, where(keeps | prepares, f, new_f)),
-            "axial": where(ends, 1, where(keeps, axial, new_axial)),
-            "diagonal": where(ends, 0, where(keeps, diagonal, new_diagonal)),
+            "f": where(keeps, f, where(ends, 0, where(prepares, f, new_f))),
+            "axial": where(keeps, axial, where(ends, 1, new_axial)),
+            "diagonal": where(keeps, diagonal, where(ends, 0, new_diagonal)),
             "new_axial": new_axial,
             "new_diagonal": new_diagonal,
         }
@@ -307,8 +309,9 @@ class ExactArc:
         received: State = {}
         for a in "xy":
             start, end, center = (inputs[f"blocks_{p}_{a}"] for p in ("start", "end", "center"))
-            received |= {f"from_{a}": start - center, f"to_{a}": end - center}
-            received |= {f"first_left_{a}": end - start, f"first_end_{a}": end}
+            # The end's is complemented, so that it is subtracted without inverters.
+            received |= {f"from_{a}": start - center, f"to_{a}": ~(end - center)}
+            received[f"first_end_{a}"] = end
         received["clockwise"] = inputs["blocks_clockwise"]
         return received | {"full_turns": inputs["blocks_full_turns"]}
 
@@ -321,6 +324,8 @@ class ExactArc:
         quadrants: list[Value] = []
         for point in ("from", "to"):
             x, y = (state[f"{point}_{a}"] for a in "xy")
+            if point == "to":
+                x, y = ~x, ~y
             zero[point] = equal(x, 0) & equal(y, 0)
             y = where(clockwise, 0 - y, y)
             # A start belongs to the quadrant after the axis it is on, an end to the one before:
@@ -338,11 +343,16 @@ class ExactArc:
             "end_quadrant": quadrants[1],
             "minus_x": where(swap, minus["y"], minus["x"]),
             "minus_y": where(swap, minus["x"], minus["y"]),
-            **{f"still_{a}": equal(state[f"first_left_{a}"], 0) for a in "xy"},
+            **{f"still_{a}": equal(state[f"from_{a}"], ~state[f"to_{a}"]) for a in "xy"},
+            **{f"first_past_{a}": self._past(state, a) for a in "xy"},
             "too_far": too_far,
             "at_center": zero["from"],
             "to_center": zero["to"],
         }
+
+    def _past(self, state: State, a: str) -> Value:
+        """Give how far the start is past the end."""
+        return self._signed(state[f"from_{a}"] + state[f"to_{a}"] + 1, self.width + 2)
 
     def _see(self, state: State) -> State:
         """Stage 2: the start in its quadrant, and how many axes are crossed."""
@@ -353,7 +363,7 @@ class ExactArc:
         negative = {"x": less(first, 2), "y": equal((first + 1) >> 1, 1) ^ clockwise}
         ahead: Value = 1
         for a in "xy":
-            wrong = less(state[f"first_left_{a}"], 0) ^ negative[a]
+            wrong = equal(less(state[f"first_past_{a}"], 0), negative[a])
             ahead = ahead & (state[f"still_{a}"] | negate(wrong))
         ahead = ahead & negate(state["still_x"] & state["still_y"])
         crossings = (state["end_quadrant"] - first) & 3
