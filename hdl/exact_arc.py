@@ -240,7 +240,7 @@ class ExactArcInput(Part):
                 if stage == "ready" and rest not in ("held", "diagonal", "unit"):
                     m.d.sync += signal.eq(r[f"seen_{rest}"])
             m.d.sync += [
-                r["ready_diagonal"].eq(_sum(_longer(x, n + 2), _longer(y, n + 2), Const(1, 1))),
+                r["ready_diagonal"].eq(x + y),
                 r["ready_unit"].eq((x == -1) & (y == 0)),
             ]
 
@@ -254,12 +254,12 @@ class ExactArcInput(Part):
             self.still.eq(r["ready_empty"] | (r["ready_fault"] != ErrorCode.NONE)),
             self.turns.eq(r["ready_turns"]),
             self.unit.eq(r["ready_unit"]),
-            second.eq(~diagonal[-1]),
+            second.eq(~diagonal[-1] | self.unit),
             self.second.eq(second),
             self.lead.eq(~r["ready_swap"] ^ second),
             self.diagonal.eq(diagonal),
             self.axial.eq(Mux(second, x, y)),
-            residual.eq(diagonal + self.axial),
+            residual.eq(_sum(_longer(diagonal, n + 3), _longer(self.axial, n + 3), Const(1, 1))),
             self.residual.eq(Cat(residual[:-1], residual[-1] ^ second)),
         ]
         for a in "xy":
@@ -301,8 +301,10 @@ class ExactArc(Part):
         self.diagonal = Signal(way_shape, reset_less=True)
         self.mode = Signal(2)
         self.second = Signal()
+        self.to_second = Signal()
         self.odd = Signal()
         self.turns = Signal(TURNS_BITS)
+        self.sole = Signal()
         self.final = Signal()
         self.unit = Signal()
         self.lead = Signal()
@@ -329,9 +331,9 @@ class ExactArc(Part):
 
         groups = {
             "E and what it grows by": [self.f, self.axial, self.diagonal],
-            "octant": [self.mode, self.second, self.odd],
+            "octant": [self.mode, self.second, self.to_second, self.odd],
             "pieces": [
-                *(self.turns, self.final, self.unit, self.lead),
+                *(self.turns, self.sole, self.final, self.unit, self.lead),
                 *self.negative.values(),
             ],
             "KOX, KOY steps left": list(self.past.values()),
@@ -365,9 +367,10 @@ class ExactArc(Part):
         free, idle, begin, step, ends, missed = (
             Signal(name=name) for name in ("free", "idle", "begin", "step", "ends", "missed")
         )
-        goes_on, frozen, turn, to_second, leads = (
-            Signal(name=name) for name in ("goes_on", "frozen", "turn", "to_second", "leads")
+        goes_on, frozen, turn, leads = (
+            Signal(name=name) for name in ("goes_on", "frozen", "turn", "leads")
         )
+        to_second = self.to_second
         # What is set to a constant, too, is reset with that: it spares gates.
         rst = ResetSignal()
         moves = self.loading | (self.running & ~frozen)
@@ -391,7 +394,6 @@ class ExactArc(Part):
                 & Mux(inp.still, idle & ~self.waiting, (idle | (self.running & self.near)) & free)
             ),
             begin.eq(inp.pending & ~inp.still & (idle | (self.running & self.near))),
-            to_second.eq(changes & ~self.second),
             frozen.eq(self.unit & ~self.final),
             goes_on.eq(self.running & ~(self.near | self.lost)),
             missed.eq(self.running & self.lost & ~self.near),
@@ -435,21 +437,24 @@ class ExactArc(Part):
                 m.d.comb += [by_axial.eq(-1), by_diagonal.eq(~self.axial)]
             with m.Case(AXIS_NEXT):
                 m.d.comb += [by_axial.eq(~self.diagonal), by_diagonal.eq(-1)]
-        more_axial, more_diagonal = Signal(), Signal(2)
+        more_axial, more_diagonal, low_diagonal = Signal(), Signal(), Signal()
         m.d.comb += more_axial.eq(Mux(to_second, slanted, ~self.loading))
+        crosses = changes & ~to_second
+        if_slanted, if_not = Signal(), Signal()
         with m.Switch(self.mode):
-            with m.Case(STEP):
-                m.d.comb += more_diagonal.eq(slanted & ~self.loading)
-            with m.Case(CHANGE):
-                m.d.comb += more_diagonal.eq(
-                    Mux(
-                        self.second,
-                        ~slanted,
-                        Cat(slanted ^ self.odd, slanted & self.odd),
-                    )
-                )
             with m.Case(OCTANT_NEXT):
-                m.d.comb += more_diagonal.eq(self.diagonal[0])
+                m.d.comb += [if_slanted.eq(self.diagonal[0]), if_not.eq(self.diagonal[0])]
+            with m.Case(AXIS_NEXT):
+                m.d.comb += [if_slanted.eq(0), if_not.eq(0)]
+            with m.Default():
+                m.d.comb += [if_slanted.eq(~crosses), if_not.eq(crosses)]
+        m.d.comb += [
+            more_diagonal.eq(Mux(slanted, if_slanted, if_not)),
+            # Axial is 0 where the octant changes.
+            low_diagonal.eq(
+                Mux(to_second, self.odd, by_diagonal[0] | self.load_diagonal[0])
+            ),
+        ]
         m.d.comb += [
             new_axial.eq(
                 _sum(
@@ -460,8 +465,8 @@ class ExactArc(Part):
             ),
             new_diagonal.eq(
                 _sum(
-                    by_diagonal,
-                    Cat(self.load_diagonal[:2] | more_diagonal, self.load_diagonal[2:]),
+                    Cat(low_diagonal, by_diagonal[1:]),
+                    Cat(more_diagonal, self.load_diagonal[1:]),
                     Const(1, 1),
                 )
             ),
@@ -478,11 +483,16 @@ class ExactArc(Part):
         goes_now = Signal()
         m.d.comb += [
             next_second.eq(self.second ^ changes),
-            next_final.eq(self.final | (turn & (self.turns == 1))),
+            next_final.eq(self.final | (turn & self.sole)),
             goes_now.eq(self.loading | goes_on),
             changing.eq(goes_on & prepares),
             may_octant.eq(goes_now & ~changing & ~next_second),
-            may_axis.eq(goes_now & ~changing & next_second & ~next_final & ~self.unit),
+            # Before the last piece no end is near.
+            may_axis.eq(
+                (self.loading | (self.running & ~prepares))
+                & next_second
+                & ~(self.final | self.unit)
+            ),
         ]
         with m.If(free):
             # The signs are known last.
@@ -490,12 +500,16 @@ class ExactArc(Part):
             m.d.sync += self.mode.eq(
                 Cat(axis_next | changing, (may_octant & ~new_diagonal[-1]) | axis_next)
             )
-            m.d.sync += self.odd.eq(self.diagonal[0])
+            m.d.sync += [
+                self.odd.eq(self.diagonal[0]),
+                to_second.eq(goes_on & (self.mode == OCTANT_NEXT)),
+            ]
             with m.If(begin):
                 m.d.sync += [
                     self.second.eq(inp.second),
                     self.lead.eq(inp.lead),
                     self.turns.eq(inp.turns),
+                    self.sole.eq(inp.turns == 1),
                     self.final.eq(inp.turns == 0),
                     self.unit.eq(inp.unit),
                     *[self.negative[a].eq(inp.negative[a]) for a in "xy"],
@@ -504,6 +518,10 @@ class ExactArc(Part):
                 m.d.sync += [
                     self.second.eq(next_second),
                     self.lead.eq(self.lead ^ leads),
+                    self.sole.eq(
+                        (self.turns[2:] == 0)
+                        & Mux(turn, self.turns[:2] == 2, self.turns[:2] == 1)
+                    ),
                     self.final.eq(next_final),
                     # What rose falls now: that axis which does not lead.
                     self.negative["x"].eq(self.negative["x"] ^ (turn & self.lead)),

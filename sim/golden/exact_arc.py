@@ -53,8 +53,10 @@ class ExactArc:
         n = self.width
         kinds: dict[str, tuple[int, bool]] = {"f": (n + 3, True)}
         kinds |= {"axial": (n + 2, True), "diagonal": (n + 2, True)}
-        kinds |= {"mode": (2, False), "second": (1, False), "odd": (1, False)}
-        kinds |= {"turns": (TURNS_BITS, False), "final": (1, False), "unit": (1, False)}
+        kinds |= {"mode": (2, False)}
+        kinds |= dict.fromkeys(("second", "to_second", "odd"), (1, False))
+        kinds |= {"turns": (TURNS_BITS, False)}
+        kinds |= dict.fromkeys(("sole", "final", "unit"), (1, False))
         kinds |= dict.fromkeys(("lead", "negative_x", "negative_y"), (1, False))
         kinds |= dict.fromkeys(("kox", "koy"), (n + 2, True))
         kinds |= dict.fromkeys(("xk", "yk"), (n + 1, True))
@@ -159,17 +161,25 @@ class ExactArc:
         turn = (changes & second) | quarter
 
         after = self._sums(state, ends)
-        final_next = final | (turn & equal(state["turns"], 1))
+        final_next = final | (turn & state["sole"])
+        turns = (state["turns"] - turn) & (2**TURNS_BITS - 1)
         second_next = second ^ changes
         sums = [after.pop(name) for name in ("new_axial", "new_diagonal")]
-        next_mode = self._next_mode(*sums, second_next, final_next | unit)
-        after["mode"] = where(goes & prepares, CHANGE, where(loading | goes, next_mode, STEP))
+        goes_on = loading | (goes & negate(prepares))
+        # Before the last piece no end is near.
+        crosses_on = (loading | (running & negate(prepares))) & negate(final | unit)
+        to_octant = goes_on & negate(second_next) & negate(less(sums[1], 0))
+        to_axis = crosses_on & second_next & negate(less(sums[0], 0))
+        # Never two of these: CHANGE, OCTANT_NEXT and AXIS_NEXT are 1, 2 and 3.
+        after["mode"] = 2 * (to_octant | to_axis) + ((goes & prepares) | to_axis)
         after["second"] = second_next
+        after["to_second"] = goes & equal(mode, OCTANT_NEXT)
         after["odd"] = state["diagonal"] & 1
-        after["turns"] = (state["turns"] - turn) & (2**TURNS_BITS - 1)
+        after["turns"] = turns
+        after["sole"] = equal(turns, 1)
         after["final"] = final_next
         after["unit"] = unit
-        after["lead"] = lead ^ ((changes & negate(second)) | quarter)
+        after["lead"] = lead ^ (state["to_second"] | quarter)
         # What rose falls now: that axis which does not lead.
         after["negative_x"] = state["negative_x"] ^ (turn & lead)
         after["negative_y"] = state["negative_y"] ^ (turn & negate(lead))
@@ -208,7 +218,7 @@ class ExactArc:
         f, axial, diagonal = state["f"], state["axial"], state["diagonal"]
         octant_next, axis_next = equal(mode, OCTANT_NEXT), equal(mode, AXIS_NEXT)
         changes = equal(mode, CHANGE)
-        to_second = changes & negate(second)
+        to_second = state["to_second"]
         goes_diagonal = negate(less(f, 0))
 
         # In octant 1 with Y − X = −2 or −1 the change adds E's own difference Y − X + 2 on the
@@ -217,16 +227,12 @@ class ExactArc:
         more = where(to_second, goes_diagonal, negate(loading))
         new_axial = by + (state["load_axial"] | axis_next) + more
         by = where(changes, axial, where(octant_next, ~axial, where(axis_next, -1, diagonal)))
-        more = where(
-            changes,
-            where(second, negate(goes_diagonal), goes_diagonal + state["odd"]),
-            where(
-                octant_next,
-                diagonal & 1,
-                where(axis_next, 0, goes_diagonal & negate(loading)),
-            ),
-        )
-        new_diagonal = by + (state["load_diagonal"] | more) + 1
+        # Axial is 0 where the octant changes.
+        low = where(to_second, state["odd"], (by | state["load_diagonal"]) & 1)
+        by = by - (by & 1) + low + state["load_diagonal"] - (state["load_diagonal"] & 1)
+        turned = goes_diagonal ^ (changes & negate(to_second))
+        more = where(octant_next, diagonal & 1, negate(axis_next) & turned)
+        new_diagonal = by + more + 1
 
         # Twice a number and 1 or, with the change of the octant, what makes it Y − X + 2.
         low = f & 1
@@ -252,24 +258,19 @@ class ExactArc:
             "new_diagonal": new_diagonal,
         }
 
-    def _next_mode(self, axial: Value, diagonal: Value, second: Value, stays: Value) -> Value:
-        """Give what the next clock is for, from what is then in the registers."""
-        octant = negate(second) & negate(less(diagonal, 0))
-        axis = second & negate(less(axial, 0)) & negate(stays)
-        return where(octant, OCTANT_NEXT, where(axis, AXIS_NEXT, STEP))
-
     def _begin(self, state: State, after: State, begin: Value) -> State:
         """Take over the prepared block."""
         n = self.width
         x, y, diagonal = state["ready_x"], state["ready_y"], state["ready_diagonal"]
-        second = negate(less(diagonal, 0))
+        second = negate(less(diagonal, 0)) | state["ready_unit"]
         axial = where(second, x, y)
-        f = diagonal + axial + where(second, 2 ** (n + 2), 0)
+        f = diagonal + axial + 1 + where(second, 2 ** (n + 2), 0)
         begun = {
             "second": second,
             # In octant 1 Y leads, and Y is the machine's y unless they are exchanged.
             "lead": negate(state["ready_swap"]) ^ second,
             "turns": state["ready_turns"],
+            "sole": equal(state["ready_turns"], 1),
             "final": equal(state["ready_turns"], 0),
             **{name: state[f"ready_{name}"] for name in ("negative_x", "negative_y", "unit")},
         }
@@ -300,7 +301,7 @@ class ExactArc:
         after |= {name: where(leave, value, state[name]) for name, value in seen.items()}
         names = [name for name in self.prepared_registers() if name.startswith("ready_")]
         ready = {name: state[name.replace("ready", "seen")] for name in names[1:-2]}
-        ready["ready_diagonal"] = state["seen_y"] + state["seen_x"] + 1
+        ready["ready_diagonal"] = state["seen_y"] + state["seen_x"]
         ready["ready_unit"] = equal(state["seen_x"], -1) & equal(state["seen_y"], 0)
         return after | {name: where(follow, value, state[name]) for name, value in ready.items()}
 
