@@ -165,13 +165,14 @@ class ExactArc:
         turns = (state["turns"] - turn) & (2**TURNS_BITS - 1)
         second_next = second ^ changes
         sums = [after.pop(name) for name in ("new_axial", "new_diagonal")]
-        goes_on = loading | (goes & negate(prepares))
+        changing = goes & prepares
+        goes_on = (loading | goes) & negate(changing)
         # Before the last piece no end is near.
         crosses_on = (loading | (running & negate(prepares))) & negate(final | unit)
         to_octant = goes_on & negate(second_next) & negate(less(sums[1], 0))
         to_axis = crosses_on & second_next & negate(less(sums[0], 0))
         # Never two of these: CHANGE, OCTANT_NEXT and AXIS_NEXT are 1, 2 and 3.
-        after["mode"] = 2 * (to_octant | to_axis) + ((goes & prepares) | to_axis)
+        after["mode"] = 2 * (to_octant | to_axis) + (changing | to_axis)
         after["second"] = second_next
         after["to_second"] = goes & equal(mode, OCTANT_NEXT)
         after["odd"] = state["diagonal"] & 1
