@@ -3,7 +3,7 @@
 From the geometry alone. Seen from the centre in the quadrant of the moment, turned onto the first,
 X falls and Y rises; F = X² + Y² − R² is what the point is off, R² being that of the start. While Y
 leads (``second`` = 0) the candidates are (0, +1) and (−1, +1), then X leads and they are (−1, 0)
-and (−1, +1). Half the sum of F at both candidates, rounded up, tells which is the nearer one::
+and (−1, +1). The sum of F at both candidates, 2E + 1, tells which is the nearer one::
 
     Y leads: E = F + 2Y − X + 1, the diagonal one if E ≥ 0
     X leads: E = F − 2X + Y + 1, the diagonal one if E < 0
