@@ -193,14 +193,10 @@ class ExactArcInput(Part):
             "y": self.quadrant[0] ^ self.quadrant[1] ^ self.clockwise,
         }
         crossings, once_round = Signal(2), Signal()
-        wrong = Cat(
-            ~self.stands[a] & ~(self.first_past[a][-1] ^ negative[a]) for a in "xy"
-        )
+        wrong = Cat(~self.stands[a] & ~(self.first_past[a][-1] ^ negative[a]) for a in "xy")
         m.d.comb += [
             crossings.eq(self.end_quadrant - self.quadrant),
-            once_round.eq(
-                (crossings == 0) & (wrong.any() | (self.stands["x"] & self.stands["y"]))
-            ),
+            once_round.eq((crossings == 0) & (wrong.any() | (self.stands["x"] & self.stands["y"]))),
         ]
         # −X and Y, whatever the signs.
         flips = {"x": ~self.minus["x"], "y": self.minus["y"]}
@@ -215,9 +211,7 @@ class ExactArcInput(Part):
                     Mux(
                         self.too_far,
                         ErrorCode.RANGE,
-                        Mux(
-                            self.at_center & ~self.to_center, ErrorCode.OFF_CURVE, ErrorCode.NONE
-                        ),
+                        Mux(self.at_center & ~self.to_center, ErrorCode.OFF_CURVE, ErrorCode.NONE),
                     )
                 ),
                 r["seen_empty"].eq(self.at_center & self.to_center),
@@ -272,7 +266,93 @@ class ExactArcInput(Part):
 
 
 class ExactArc(Part):
-    """DOC"""
+    """Draws an arc: the circle's own residual chooses every step; no step is half a step off.
+
+    Computes, seen from the centre in the quadrant of the moment turned onto the first, where X
+    falls and Y rises, with F = X² + Y² − R² and R that of the start: of the two points that may
+    come next the one with the smaller |F|. While Y leads these are (0, +1) and (−1, +1) away, then
+    X leads and they are (−1, 0) and (−1, +1). Twice E and 1 is the sum of F at both, which is odd,
+    so there are no ties::
+
+        Y leads: E = F + 2Y − X + 1, diagonal if E ≥ 0; else E := E + 2·axial + 1, axial = Y + 1
+        X leads: E = F − 2X + Y + 1, diagonal if E < 0; else E := E + 2·axial + 1, axial = 1 − X
+        diagonal, in both:              E := E + 2·diagonal + 1, diagonal = Y − X + 2
+
+    ``axial`` grows by 1 with every step, ``diagonal`` by 1 or, with a diagonal step, by 2. F is 0 at
+    the start, so E begins with 2Y − X + 1 or Y − 2X + 1: no multiplier, no radius, no root.
+
+    Where the leading axis changes E loses X + Y, and where Y comes to lead in the next quadrant it
+    loses 2Y. One clock before that step ``axial`` and ``diagonal`` are set to what this step and
+    the change together add to E: 0 and 1 − X where the octant changes (E then gains ``odd`` more,
+    Y − X + 2, or diagonally ``odd`` + 1), −Y and 0 where an axis is reached. The octant
+    is left with the first step from Y − X ≥ −2, where both rules choose alike but for points that
+    are as near.
+
+    Registers: ``f`` = E, its sign bit complemented while X leads (``second``), so that a step is
+    diagonal when it is 0 in either octant; ``mode`` = what the clock is for: a step, a step with a
+    change, the clock before a change of octant or before an axis; ``turns`` = axis crossings to
+    come, ``sole`` and ``final`` that this is 1 or 0; ``unit`` a circle of radius 1, a step for a
+    quarter; ``lead`` the machine's y leads; ``negative_x``, ``negative_y`` the way each moves;
+    KOX, KOY = position − end, XK, YK = end: the position is their sum.
+
+    The end: when there are no crossings left and the point that is left is no more than a step from
+    the end on each axis (``near``), the next step leads there and is ``last``. So an end that is
+    off the circle by up to a step is reached exactly, and never by a step back.
+
+    Latency: a block accepted in clock 0 is prepared from clock 1 to 4 and loaded in clock 5; its
+    first step is decided in clock 6 and offered in clock 7, a clock later if it is that of a change.
+    ``done`` follows the last step by a clock.
+
+    Throughput: one clock a step, and one more before a step with which the leading axis changes or
+    an axis is crossed. Between blocks there is one clock, that of loading, which is the one in
+    which the last step before is taken: steps of two blocks are two clocks apart, also of blocks of
+    a single step. A block without a step takes a clock, and one more behind a block that moved.
+
+    Steps: ``steps`` holds a step until it is taken and everything but the preparation waits for it.
+    ``ready`` only enables registers. ``position`` shows the steps taken, not the one that waits;
+    loading a block sets it to the block's start.
+
+    Reset: everything 0 but ``axial`` = 1, nothing held, position at the origin.
+
+    Overflow: ``error`` is ``RANGE`` for one clock, in place of ``done``, when a coordinate seen from
+    the centre does not fit n bits, and ``OFF_CURVE`` when the start is the centre and the end is
+    not: nothing moves. **One departure from the contract:** that the end is more than a step off the
+    circle, or that the arc leads out of the coordinates, is not seen beforehand (it would take the
+    radius; :func:`discreta.sim.points.check_arc` sees it). Such an end is missed: then the block
+    ends late, where X is 0 in the last quadrant or where the end is more than 4 steps behind on an
+    axis, with ``OFF_CURVE``, no step is ``last`` and the position is that of the steps taken. An
+    arc that leads out of the coordinates wraps. E takes n + 3 bits: \\|E\\| ≤ 2R + 2, R ≤ √2·(2^n −
+    1) < 2^(n+1) − 1; X and Y are less than 1.5·2^n, so that ``axial`` and ``diagonal`` take n + 2.
+
+    Error bound: less than half a step, radially, at every point but an end that is itself off the
+    circle; proven (``discreta prove exact_arc``). The end point is exact.
+
+    Source: ours, beyond the documents; E is the midpoint rule's (Pitteway 1967, Bresenham 1977),
+    quadrants, directions and turns are those of the lecture's circular interpolation.
+
+    Parameters
+    ----------
+    width : int
+        n, 4 to 32. Coordinates are signed, n + 1 bits; steps are 1 long.
+    axes : int
+        2.
+
+    Attributes
+    ----------
+    parameters : dict of str to object
+        The parameters it was made with.
+    entering : Signal
+        1 in the clock in which a step is decided that nothing keeps: it is offered in the next one.
+    diagram : dict of str to list of Signal
+        Every register there is, by the title of its group.
+    registers : dict of str to Signal
+        The same registers, by their names in waveforms.
+
+    Raises
+    ------
+    TypeError, ValueError
+        A parameter is not one of the above.
+    """
 
     notation = "n = width"
 
@@ -415,13 +495,9 @@ class ExactArc(Part):
                     self.f[0],
                 )
             ),
-            half.eq(
-                _sum(self.f[1:], Cat(addend[:-1], addend[-1] ^ changes), carry)
-            ),
+            half.eq(_sum(self.f[1:], Cat(addend[:-1], addend[-1] ^ changes), carry)),
         ]
-        low = Mux(
-            self.loading, self.load_f[0], self.f[0] ^ Mux(to_second, slanted ^ self.odd, 1)
-        )
+        low = Mux(self.loading, self.load_f[0], self.f[0] ^ Mux(to_second, slanted ^ self.odd, 1))
         with m.If(rst | (free & moves & (ends | ~prepares))):
             m.d.sync += self.f.eq(Mux(rst | ends, 0, Cat(low, half)))
 
@@ -451,9 +527,7 @@ class ExactArc(Part):
         m.d.comb += [
             more_diagonal.eq(Mux(slanted, if_slanted, if_not)),
             # Axial is 0 where the octant changes.
-            low_diagonal.eq(
-                Mux(to_second, self.odd, by_diagonal[0] | self.load_diagonal[0])
-            ),
+            low_diagonal.eq(Mux(to_second, self.odd, by_diagonal[0] | self.load_diagonal[0])),
         ]
         m.d.comb += [
             new_axial.eq(
@@ -519,8 +593,7 @@ class ExactArc(Part):
                     self.second.eq(next_second),
                     self.lead.eq(self.lead ^ leads),
                     self.sole.eq(
-                        (self.turns[2:] == 0)
-                        & Mux(turn, self.turns[:2] == 2, self.turns[:2] == 1)
+                        (self.turns[2:] == 0) & Mux(turn, self.turns[:2] == 2, self.turns[:2] == 1)
                     ),
                     self.final.eq(next_final),
                     # What rose falls now: that axis which does not lead.
@@ -562,9 +635,7 @@ class ExactArc(Part):
             ]
             next_pulse = step & moves
             m.d.comb += [
-                rest.eq(
-                    Mux(self.loading, self.load_past[a][:3], _moved(here, next_pulse, way))
-                ),
+                rest.eq(Mux(self.loading, self.load_past[a][:3], _moved(here, next_pulse, way))),
                 about.eq((rest == 0) | (rest == 1) | (rest == 7)),
                 close[index].eq(about & Mux(self.loading, _few(self.load_past[a]), few)),
                 back[index].eq(~few & ~(past[-1] ^ way)),

@@ -90,7 +90,7 @@ def survey_groups(method: Method, width: int) -> list[Group]:
     """
     if method.timed:
         return _timed_groups(method, width)
-    if method.name == "exact_arc":
+    if method.exact and method.curve == "arc":
         return _exact_arc_groups(width)
     if method.curve == "line":
         return _line_groups(width)

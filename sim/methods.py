@@ -124,6 +124,8 @@ class Method(Design):
         last step, alone and without stalls; ``blocks`` has shape (blocks, block fields).
     bound : callable
         ``bound(golden)``: the proven error bound of one model, in steps; None without one.
+    exact : bool
+        No step leads half a step off the curve, and what cannot be drawn so is not always refused.
     timed : bool
         It runs on a constant carrier: its blocks end with the fields ``periods`` and ``period``,
         and its golden models know their ``least_period``.
@@ -136,6 +138,7 @@ class Method(Design):
     clocks_per_step: str
     clocks: Callable[[Any, np.ndarray], np.ndarray]
     bound: Callable[[Any], float | None]
+    exact: bool = False
     timed: bool = False
     per_period: bool = False
 
@@ -379,6 +382,7 @@ METHODS = {
             settings={"default": {}},
             clocks=_exact_arc_clocks,
             bound=lambda _: 0.5,
+            exact=True,
         ),
         Method(
             name="conic",

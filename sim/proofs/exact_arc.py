@@ -186,15 +186,11 @@ class _Registers:
                 z3.And(running, unit, z3.Not(final)), z3.And(x == 1, y == 0, second, e == -1)
             ),
             "unit, mode": z3.Implies(z3.And(unit, z3.Not(final)), mode == STEP),
-            "last piece": z3.Implies(
-                z3.Or(running, loading), final == (state["turns"] == 0)
-            ),
+            "last piece": z3.Implies(z3.Or(running, loading), final == (state["turns"] == 0)),
             "last crossing": z3.Implies(
                 z3.Or(running, loading), (state["sole"] == 1) == (state["turns"] == 1)
             ),
-            "idle": z3.Implies(
-                z3.Not(running), z3.And(state["f"] == 0, axial == 1, diagonal == 0)
-            ),
+            "idle": z3.Implies(z3.Not(running), z3.And(state["f"] == 0, axial == 1, diagonal == 0)),
             "nothing to load": z3.Implies(
                 z3.Not(loading),
                 z3.And(*(state[f"load_{k}"] == 0 for k in ("f", "axial", "diagonal"))),
@@ -242,8 +238,7 @@ class _Registers:
         )
         facts["ready unit"] = z3.Implies(
             ready,
-            (state["ready_unit"] == 1)
-            == z3.And(state["ready_x"] == -1, state["ready_y"] == 0),
+            (state["ready_unit"] == 1) == z3.And(state["ready_x"] == -1, state["ready_y"] == 0),
         )
         for stage in ("seen", "ready"):
             held = state[f"{stage}_held"] == 1
@@ -343,18 +338,14 @@ class _Registers:
             for a in "xy"
         }
         core = [
-            name
-            for name in after
-            if name not in (*golden.prepared_registers(), "done", "error")
+            name for name in after if name not in (*golden.prepared_registers(), "done", "error")
         ]
         lasting = ["f", "axial", "diagonal", "mode", "second", "turns", "lead", "running"]
         lasting += ["loading", "waiting", "pulse_x", "pulse_y", "kox", "koy", "xk", "yk"]
         unmoved = same({name: after[name] for name in core}, state)
         survives = self.invariant(after, self.ghosts_after)
         return [
-            self.obligation(
-                "invariant: it holds after reset", [], self.invariant(reset, zero)
-            ),
+            self.obligation("invariant: it holds after reset", [], self.invariant(reset, zero)),
             self.obligation(
                 "invariant: E, with its sign complemented while X leads, is what the circle's "
                 "equation says of X, Y; axial = Y + 1 or 1 − X, diagonal = Y − X + 2, but for the "
@@ -368,10 +359,8 @@ class _Registers:
                 "the axis that leads moves with every step",
                 [*everything, self.free, self.goes],
                 {
-                    "x": (after["pulse_x"] == 1)
-                    == z3.Or(self.on_diagonal, state["lead"] == 0),
-                    "y": (after["pulse_y"] == 1)
-                    == z3.Or(self.on_diagonal, state["lead"] == 1),
+                    "x": (after["pulse_x"] == 1) == z3.Or(self.on_diagonal, state["lead"] == 0),
+                    "y": (after["pulse_y"] == 1) == z3.Or(self.on_diagonal, state["lead"] == 1),
                 },
             ),
             self.obligation(
@@ -458,7 +447,8 @@ class _Registers:
             self.obligation(
                 "stall: a step that is not taken stays, and no register of the arc moves",
                 [state["waiting"] == 1, z3.Not(self.taken)],
-                unmoved | {f"steps {a}": later[f"steps_{a}"] == outputs[f"steps_{a}"] for a in "xy"},
+                unmoved
+                | {f"steps {a}": later[f"steps_{a}"] == outputs[f"steps_{a}"] for a in "xy"},
             ),
             self.obligation(
                 "no gap: a prepared block is begun with the last step of the one before it, and "

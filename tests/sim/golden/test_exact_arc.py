@@ -99,8 +99,11 @@ def test_circles_close_and_are_symmetric(radius):
 
 
 def test_every_off_curve_block_ends_and_its_position_is_exact():
-    blocks = [(x, 0, u, v, 0, 0, c, 0) for x in (1, 5, 12) for u, v, c in product(
-        range(-15, 16, 3), range(-15, 16, 2), (0, 1))]
+    blocks = [
+        (x, 0, u, v, 0, 0, c, 0)
+        for x in (1, 5, 12)
+        for u, v, c in product(range(-15, 16, 3), range(-15, 16, 2), (0, 1))
+    ]
     steps, answers, places, lasts = run(ExactArc(4), blocks, limit=300)
     for block, made, (done, error), place, last in zip(
         blocks, steps, answers, places, lasts, strict=True
