@@ -24,22 +24,22 @@ class ExactArcInput(Part):
     so whether the end is on the circle, and whether the arc stays in the coordinates there are, is
     not looked at.
 
-    1. ``from`` and ``to`` = start and end seen from the centre, ``first_past`` = end − start; in the
-       clock after that the quadrants, the signs and what is too far (``coded``).
-    2. ``seen_x``, ``seen_y`` = XH, YH; the crossings, the fault and the directions.
-    3. ``ready_diagonal`` = YH − XH + 1.
+    1. ``from`` = start seen from the centre, ``to`` = the end, complemented; in the clock after that
+       (``coded``) ``first_past`` = start − end, the quadrants, the signs and what is too far.
+    2. ``seen_x``, ``seen_y`` = −XH, YH; the crossings, the fault and the directions.
+    3. ``ready_diagonal`` = YH − XH.
 
     - ``pending``: stage 3 holds a block, until ``take``; ``still``: it makes no step, because it is
-      ``empty`` (start, end and centre are one point) or has a ``fault``: ``RANGE`` when a coordinate
-      seen from the centre does not fit n bits, else ``OFF_CURVE`` when the start is the centre and
-      the end is not;
-    - ``second`` says that X leads at the start, YH ≥ XH − 1; ``axial`` = XH complemented then, else
-      YH; ``residual`` = E, with its sign complemented when X leads;
+      ``empty`` (start, end and centre are one point) or has a ``fault``: ``RANGE`` when a
+      coordinate seen from the centre does not fit n bits, else ``OFF_CURVE`` when the start is the
+      centre and the end is not;
+    - ``second`` says that X leads at the start, YH ≥ XH or radius 1; ``axial`` = −XH then, else YH;
+      ``residual`` = E, with its sign complemented when X leads;
     - ``unit`` says that the start is (1, 0): a circle of radius 1.
 
-    Latency: a block accepted in clock 0 is ``pending`` in clock 4. Throughput: a stage takes a block
-    over when the one after it is empty, and stage 1 also while it gives its own away: a block in two
-    clocks. ``blocks.ready`` depends on registers alone.
+    Latency: a block accepted in clock 0 is ``pending`` in clock 4. Throughput: a block in two
+    clocks; a stage takes a block over when it is empty, stage 1 also while it gives its own away.
+    ``blocks.ready`` depends on registers alone.
     Reset: nothing held. Overflow: reported by ``fault``. Error: none, it is exact.
     Source: ours; the frame is the lecture's (circular interpolation, the first quadrant).
 
@@ -278,15 +278,14 @@ class ExactArc(Part):
         X leads: E = F − 2X + Y + 1, diagonal if E < 0; else E := E + 2·axial + 1, axial = 1 − X
         diagonal, in both:              E := E + 2·diagonal + 1, diagonal = Y − X + 2
 
-    ``axial`` grows by 1 with every step, ``diagonal`` by 1 or, with a diagonal step, by 2. F is 0 at
-    the start, so E begins with 2Y − X + 1 or Y − 2X + 1: no multiplier, no radius, no root.
+    ``axial`` grows by 1 with every step, ``diagonal`` by 1 or, with a diagonal step, by 2. F is 0
+    at the start, so E begins with 2Y − X + 1 or Y − 2X + 1: no multiplier, no radius, no root.
 
     Where the leading axis changes E loses X + Y, and where Y comes to lead in the next quadrant it
     loses 2Y. One clock before that step ``axial`` and ``diagonal`` are set to what this step and
-    the change together add to E: 0 and 1 − X where the octant changes (E then gains ``odd`` more,
-    Y − X + 2, or diagonally ``odd`` + 1), −Y and 0 where an axis is reached. The octant
-    is left with the first step from Y − X ≥ −2, where both rules choose alike but for points that
-    are as near.
+    the change together add to E: 0 and 1 − X where the octant changes (E then gains ``odd`` = Y − X
+    + 2 more, or diagonally ``odd`` + 1), −Y and 0 where an axis is reached (and 1 more). The octant
+    is left with the first step from Y − X ≥ −2: near 45° the choice has room to spare.
 
     Registers: ``f`` = E, its sign bit complemented while X leads (``second``), so that a step is
     diagonal when it is 0 in either octant; ``mode`` = what the clock is for: a step, a step with a
@@ -300,7 +299,7 @@ class ExactArc(Part):
     off the circle by up to a step is reached exactly, and never by a step back.
 
     Latency: a block accepted in clock 0 is prepared from clock 1 to 4 and loaded in clock 5; its
-    first step is decided in clock 6 and offered in clock 7, a clock later if it is that of a change.
+    first step is decided in clock 6 and offered in clock 7, or a clock later if it is a change's.
     ``done`` follows the last step by a clock.
 
     Throughput: one clock a step, and one more before a step with which the leading axis changes or
@@ -314,12 +313,12 @@ class ExactArc(Part):
 
     Reset: everything 0 but ``axial`` = 1, nothing held, position at the origin.
 
-    Overflow: ``error`` is ``RANGE`` for one clock, in place of ``done``, when a coordinate seen from
-    the centre does not fit n bits, and ``OFF_CURVE`` when the start is the centre and the end is
-    not: nothing moves. **One departure from the contract:** that the end is more than a step off the
-    circle, or that the arc leads out of the coordinates, is not seen beforehand (it would take the
-    radius; :func:`discreta.sim.points.check_arc` sees it). Such an end is missed: then the block
-    ends late, where X is 0 in the last quadrant or where the end is more than 4 steps behind on an
+    Overflow: ``error`` is ``RANGE`` for one clock, in place of ``done``, when a coordinate seen
+    from the centre does not fit n bits, and ``OFF_CURVE`` when the start is the centre and the end
+    is not: nothing moves. **One departure from the contract:** that the end is more than a step off
+    the circle, or that the arc leads out of the coordinates, is not seen beforehand (it would take
+    the radius); the host's helper, ``discreta.sim.points.check_arc``, sees it. Such an end is
+    missed: then the block ends late, where X is 0 in the last quadrant or where the end is more than 4 steps behind on an
     axis, with ``OFF_CURVE``, no step is ``last`` and the position is that of the steps taken. An
     arc that leads out of the coordinates wraps. E takes n + 3 bits: \\|E\\| ≤ 2R + 2, R ≤ √2·(2^n −
     1) < 2^(n+1) − 1; X and Y are less than 1.5·2^n, so that ``axial`` and ``diagonal`` take n + 2.

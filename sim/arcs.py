@@ -171,7 +171,7 @@ def radii(blocks: np.ndarray) -> np.ndarray:
 
 
 def faster_steps(blocks: np.ndarray) -> np.ndarray:
-    """Give the steps of the axis that moves faster: R·∫max(|cos φ|, |sin φ|) dφ. Shape (blocks,)."""
+    """Give the steps of the axis that moves faster, R·∫max(|cos φ|, |sin φ|) dφ, by blocks."""
     start, _ = seen_from_center(blocks)
     begin = np.arctan2(start[:, 1] * np.where(blocks[:, 6] == 1, -1, 1), start[:, 0])
 

@@ -323,7 +323,8 @@ _EXACT_ARCS = _ExactArcs()
 
 
 def _curve(method: Method) -> _Curve:
-    return _EXACT_ARCS if method.exact and method.curve == "arc" else _CURVES[method.curve, method.timed]
+    exact = method.exact and method.curve == "arc"
+    return _EXACT_ARCS if exact else _CURVES[method.curve, method.timed]
 
 
 def say_worst(method: Method, group: Group, row: SurveyRow) -> tuple[str, str]:

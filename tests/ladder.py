@@ -42,9 +42,9 @@ from discreta.sim.stretch import EVENT_COLUMNS
 from tests import lecture
 from tests.arcs import arc_steps, draw_arcs, fault, is_empty, seen
 from tests.broken import ALL, SOUND, VARIANTS, Variant
-from tests.exact_arcs import exact_steps
 from tests.conics import FIELDS, conic_steps, draw_conics
 from tests.conics import fault as conic_fault
+from tests.exact_arcs import exact_steps
 from tests.hdl.traces import golden_trace
 from tests.lines import article
 

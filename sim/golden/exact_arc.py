@@ -215,7 +215,7 @@ class ExactArc:
     def _sums(self, state: State, ends: Value) -> State:
         """E and what it grows by."""
         n = self.width
-        mode, second, loading = state["mode"], state["second"], state["loading"]
+        mode, loading = state["mode"], state["loading"]
         f, axial, diagonal = state["f"], state["axial"], state["diagonal"]
         octant_next, axis_next = equal(mode, OCTANT_NEXT), equal(mode, AXIS_NEXT)
         changes = equal(mode, CHANGE)

@@ -147,7 +147,6 @@ class _Registers:
         running, loading = state["running"] == 1, state["loading"] == 1
         second, final = state["second"] == 1, state["final"] == 1
         unit = state["unit"] == 1
-        idle = z3.And(z3.Not(running), z3.Not(loading))
         top = self.number(2 ** (n + 2))
         signed = z3.If(second, z3.If(e < 0, e + top, e - top), e)
         own = z3.If(second, 1 - x, y + 1)
@@ -272,7 +271,7 @@ class _Registers:
                 coded, state[f"first_past_{a}"] == self._way(state[f"from_{a}"] - to)
             )
         facts["coded"] = z3.Implies(coded, state["held"] == 1)
-        codes = self.golden._code({k: v for k, v in state.items()})
+        codes = self.golden._code(dict(state))
         for name in ("quadrant", "minus_x", "minus_y", "at_center", "too_far"):
             facts[f"coded {name}"] = z3.Implies(coded, state[name] == codes[name])
         return facts
@@ -460,8 +459,8 @@ class _Registers:
                 },
             ),
             self.obligation(
-                f"room: E takes n + 3 = {n + 3} bits where |E| ≤ 2R + 2 and R ≤ (2^n − 1)·√2; X and "
-                "Y are less than 1.5·2^n",
+                f"room: E takes n + 3 = {n + 3} bits where |E| ≤ 2R + 2 and R ≤ (2^n − 1)·√2; X "
+                "and Y are less than 1.5·2^n",
                 [],
                 {
                     "E": z3.BoolVal(8 * (2**n - 1) ** 2 < (2 ** (n + 2) - 5) ** 2),

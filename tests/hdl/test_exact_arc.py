@@ -1,4 +1,4 @@
-"""The exact interpolator for arcs: the contract, clock by clock, and equality to the golden model."""
+"""The exact interpolator of arcs: the contract, clock by clock, and equality to its model."""
 
 import numpy as np
 import pytest
@@ -87,7 +87,7 @@ def test_clocks_of_a_quarter_by_hand():
 @pytest.mark.parametrize(("width", "radius"), [(4, 7), (6, 30)])
 def test_every_step_and_its_clock(width, radius):
     """One clock a step, one where octant or quadrant change, one between blocks."""
-    blocks = [b for b in draw_arcs(width, 40, seed=5, radius=radius, turns=1).tolist()]
+    blocks = draw_arcs(width, 40, seed=5, radius=radius, turns=1).tolist()
     blocks = [b for k, b in enumerate(blocks) if k % 8 not in (6, 7)]
     events = run(width, blocks)
     accepted = events[column(events, "accepted") == 1][:, 0].tolist()
