@@ -24,8 +24,8 @@ class ExactArcInput(Part):
     so whether the end is on the circle, and whether the arc stays in the coordinates there are, is
     not looked at.
 
-    1. ``from`` = start seen from the centre, ``to`` = the end, complemented; in the clock after that
-       (``coded``) ``first_past`` = start − end, the quadrants, the signs and what is too far.
+    1. ``from`` = start seen from the centre, ``to`` = the end, complemented; in the clock after
+       that (``coded``) ``first_past`` = start − end, the quadrants, the signs and what is too far.
     2. ``seen_x``, ``seen_y`` = −XH, YH; the crossings, the fault and the directions.
     3. ``ready_diagonal`` = YH − XH.
 
@@ -318,7 +318,8 @@ class ExactArc(Part):
     is not: nothing moves. **One departure from the contract:** that the end is more than a step off
     the circle, or that the arc leads out of the coordinates, is not seen beforehand (it would take
     the radius); the host's helper, ``discreta.sim.points.check_arc``, sees it. Such an end is
-    missed: then the block ends late, where X is 0 in the last quadrant or where the end is more than 4 steps behind on an
+    missed: then the block ends late, where X is 0 in the last quadrant or where the end is more
+    than 4 steps behind on an
     axis, with ``OFF_CURVE``, no step is ``last`` and the position is that of the steps taken. An
     arc that leads out of the coordinates wraps. E takes n + 3 bits: \\|E\\| ≤ 2R + 2, R ≤ √2·(2^n −
     1) < 2^(n+1) − 1; X and Y are less than 1.5·2^n, so that ``axial`` and ``diagonal`` take n + 2.
@@ -632,7 +633,7 @@ class ExactArc(Part):
                 here.eq(_moved(past[:3], pulse, direction)),
                 few.eq(_few(past)),
             ]
-            next_pulse = step & moves
+            next_pulse = ~prepares & moves
             m.d.comb += [
                 rest.eq(Mux(self.loading, self.load_past[a][:3], _moved(here, next_pulse, way))),
                 about.eq((rest == 0) | (rest == 1) | (rest == 7)),

@@ -30,7 +30,7 @@ def exact_steps(block: Sequence[int]) -> list[tuple[int, Point]]:
 
     while True:
         if crossings == 0 and abs(x - xk) <= 1 and abs(y - yk) <= 1:
-            return [*steps, (clock, tuple(block[2:4]))]
+            return [*steps, (clock, (block[2], block[3]))]
         assert x > 0 or crossings
         candidates = [(x - 1, y), (x - 1, y + 1)] if x_leads else [(x, y + 1), (x - 1, y + 1)]
         changes = not x_leads and y >= x - 2

@@ -190,7 +190,9 @@ class ExactArc:
             way = state[f"negative_{a}"]
             pulse = leads | diagonal
             here = state[f"ko{a}"] + _move(state[f"pulse_{a}"], state[f"direction_{a}"])
-            rest = where(loading, state[f"load_past_{a}"], here + _move(steps & pulse, way))
+            rest = where(
+                loading, state[f"load_past_{a}"], here + _move(negate(prepares) & pulse, way)
+            )
             close = close & less(-2, rest) & less(rest, 2)
             after[f"ko{a}"] = where(
                 loading, state[f"load_past_{a}"], self._signed(here, self.width + 2)

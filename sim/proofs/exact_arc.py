@@ -45,6 +45,11 @@ def promises(golden: ExactArc) -> list[Obligation | Exhaustive]:
     return found
 
 
+def _prepares(name: str) -> bool:
+    """Tell the facts about the stages of preparation."""
+    return name.split(" ")[0] in ("held", "coded", "seen", "ready")
+
+
 class _Registers:
     """What is promised of the registers, in bit-vectors."""
 
@@ -348,10 +353,16 @@ class _Registers:
             self.obligation(
                 "invariant: E, with its sign complemented while X leads, is what the circle's "
                 "equation says of X, Y; axial = Y + 1 or 1 − X, diagonal = Y − X + 2, but for the "
-                "clock of a change; the position, with the step that waits, is the centre ± X, Y: so "
-                "it is after every clock",
+                "clock of a change; the position, with the step that waits, is the centre ± X, Y: "
+                "so it is after every clock",
                 [*everything, *rooms_after],
-                survives,
+                {name: fact for name, fact in survives.items() if not _prepares(name)},
+            ),
+            self.obligation(
+                "invariant: a block that is prepared begins in the first quadrant turned to that of "
+                "its start, at centre ± XH, YH: likewise",
+                [fact for name, fact in known.items() if _prepares(name)],
+                {name: fact for name, fact in survives.items() if _prepares(name)},
             ),
             self.obligation(
                 "choice: a step is diagonal when E ≥ 0 while Y leads, when E < 0 while X leads; "

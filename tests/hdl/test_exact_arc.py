@@ -123,12 +123,12 @@ def test_the_path_is_the_same_however_long_a_step_waits():
     blocks = np.concatenate([draw_arcs(5, 16, seed=6, radius=12, turns=1), SMALL])
     free, held = (run(5, blocks, stalls) for stalls in (NO_STALLS, Stalls(7, stall=0.7)))
     moves = [events[column(events, "taken") == 1][:, 5:8] for events in (free, held)]
-    assert np.array_equal(*moves)
+    assert np.array_equal(moves[0], moves[1])
     answers = [
         events[(column(events, "done") | column(events, "error")) != 0][:, 2:4]
         for events in (free, held)
     ]
-    assert np.array_equal(*answers)
+    assert np.array_equal(answers[0], answers[1])
     assert held[-1, 0] > free[-1, 0]
 
 

@@ -111,7 +111,7 @@ FLAWS = [
     ),
     Flaw(
         "the axes are not exchanged",
-        "invariant: E",
+        "invariant: a block",
         "_see",
         lambda at: {"seen_swap": at.after["seen_swap"] & 0},
     ),
@@ -226,6 +226,7 @@ def test_half_a_step_is_not_proven_where_the_octant_is_left_late(which):
     (obligation,) = [
         it for it in promises(ExactArc(WIDTH)) if it.title.startswith(f"half a step: while {which}")
     ]
+    assert isinstance(obligation, Obligation)
     # Without the last assumption, that this axis may lead, the proof must fail.
     wider = Obligation(obligation.title, obligation.assumptions[:-1], obligation.claims, True)
     assert check(obligation).holds
