@@ -392,6 +392,7 @@ class ExactArc(Part):
         self.past = {a: Signal(way_shape, name=f"ko{a}") for a in "xy"}
         self.end = {a: Signal(end_shape, name=f"{a}k") for a in "xy"}
         self.near = Signal()
+        self.behind = Signal()
         self.lost = Signal()
         self.running = Signal()
         self.loading = Signal()
@@ -419,7 +420,7 @@ class ExactArc(Part):
             "KOX, KOY steps left": list(self.past.values()),
             "XK, YK end": list(self.end.values()),
             "УУ": [
-                *(self.near, self.lost, self.running, self.loading),
+                *(self.near, self.behind, self.lost, self.running, self.loading),
                 *(self.done_register, self.error_register),
             ],
             "step that waits": [
@@ -656,7 +657,8 @@ class ExactArc(Part):
         with m.If(free):
             m.d.sync += [
                 self.near.eq(goes_now & next_final & close.all()),
-                self.lost.eq(goes_on & self.final & (to_axis | back.any())),
+                self.behind.eq(self.running & self.final & back.any()),
+                self.lost.eq(goes_on & self.final & (to_axis | self.behind)),
             ]
 
         m.d.sync += [

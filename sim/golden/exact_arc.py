@@ -60,7 +60,7 @@ class ExactArc:
         kinds |= dict.fromkeys(("lead", "negative_x", "negative_y"), (1, False))
         kinds |= dict.fromkeys(("kox", "koy"), (n + 2, True))
         kinds |= dict.fromkeys(("xk", "yk"), (n + 1, True))
-        kinds |= dict.fromkeys(("near", "lost", "running", "loading", "done"), (1, False))
+        kinds |= dict.fromkeys(("near", "behind", "lost", "running", "loading", "done"), (1, False))
         kinds |= {"error": (2, False)}
         waits = ("waiting", "pulse_x", "pulse_y", "direction_x", "direction_y", "last")
         kinds |= dict.fromkeys(waits, (1, False))
@@ -201,13 +201,15 @@ class ExactArc:
             after[f"pulse_{a}"] = steps & where(near, here & 1, pulse)
             after[f"direction_{a}"] = where(near, negate((here >> 1) & 1), way)
         after["near"] = (loading | goes) & final_next & close
-        # No axis is left to cross, and X is 1 before this step or the end is behind the last one.
-        behind = second & negate(less(axial, 0))
+        # No axis is left to cross, and X is 1 before this step or the end was behind.
+        to_axis = second & negate(less(axial, 0))
+        behind: Value = 0
         for a in "xy":
             past = state[f"ko{a}"]
             back = where(state[f"negative_{a}"], less(past, -BACK), less(BACK - 1, past))
             behind = behind | back
-        after["lost"] = goes & final & behind
+        after["behind"] = running & final & behind
+        after["lost"] = goes & final & (to_axis | state["behind"])
         after["waiting"] = steps
         after["last"] = near
         after["running"] = loading | goes

@@ -359,8 +359,8 @@ class _Registers:
                 {name: fact for name, fact in survives.items() if not _prepares(name)},
             ),
             self.obligation(
-                "invariant: a block that is prepared begins in the first quadrant turned to that of "
-                "its start, at centre ± XH, YH: likewise",
+                "invariant: a block that is prepared begins in the first quadrant turned to that "
+                "of its start, at centre ± XH, YH: likewise",
                 [fact for name, fact in known.items() if _prepares(name)],
                 {name: fact for name, fact in survives.items() if _prepares(name)},
             ),
