@@ -9,7 +9,7 @@ Seen from the centre, a start on an axis belongs to the quadrant after it, as th
 end on an axis to the quadrant before it. So start = end is a full turn.
 """
 
-from math import atan2, degrees, isqrt
+from math import atan2, degrees, isqrt, pi, sqrt
 
 import numpy as np
 
@@ -17,8 +17,10 @@ __all__ = [
     "OFF_CURVE",
     "RANGE",
     "crossings",
+    "faster_steps",
     "is_empty",
     "limits",
+    "radii",
     "reaches",
     "refusals",
     "seen_from_center",
@@ -160,3 +162,23 @@ def swept(blocks: np.ndarray) -> np.ndarray:
         angles.append(degrees(atan2(sine, cosine)) + 360 * behind)
     total = np.where(is_empty(blocks), 0, np.array(angles) + 360 * blocks[:, 7])
     return np.where(blocks[:, 6] == 1, -total, total)
+
+
+def radii(blocks: np.ndarray) -> np.ndarray:
+    """Give the distance of every start from its centre, in steps. Shape (blocks,)."""
+    start, _ = seen_from_center(blocks)
+    return np.hypot(*start.T.astype(float))
+
+
+def faster_steps(blocks: np.ndarray) -> np.ndarray:
+    """Give the steps of the axis that moves faster, R·∫max(|cos φ|, |sin φ|) dφ, by blocks."""
+    start, _ = seen_from_center(blocks)
+    begin = np.arctan2(start[:, 1] * np.where(blocks[:, 6] == 1, -1, 1), start[:, 0])
+
+    def integral(angle: np.ndarray) -> np.ndarray:
+        quarters, rest = np.divmod(angle, pi / 2)
+        part = np.where(rest < pi / 4, np.sin(rest), sqrt(2) - np.cos(rest))
+        return quarters * sqrt(2) + part
+
+    angle = np.radians(np.abs(swept(blocks)))
+    return radii(blocks) * (integral(begin + angle) - integral(begin))

@@ -7,7 +7,7 @@ from math import ceil, pi, sqrt
 import numpy as np
 
 from discreta.hdl.contract import MIN_WIDTH
-from discreta.sim.arcs import RANGE, refusals, seen_from_center, swept
+from discreta.sim.arcs import RANGE, faster_steps, radii, refusals
 from discreta.sim.carrier import angles, least_periods, lengths
 from discreta.sim.conics import KINDS, ellipse, motion, random_blocks
 from discreta.sim.methods import Method
@@ -27,6 +27,9 @@ _FEWEST = 64
 #: Lines of a sample, arcs of a sample, curves of every kind, and circles or ellipses that are run
 #: ten times round.
 _LINES, _ARCS, _CURVES, _TEN_TURNS = 1 << 16, 1 << 10, 20_000, 32
+
+#: Arcs of a sample for the exact interpolator, by the width; and their largest radius for 2^width.
+_EXACT_ARCS, _EXACT_RADIUS = {12: 2_000_000}, 2800 / 4096
 
 #: On a carrier: steps per period from and to, along the longer axis of a line and along an arc, and
 #: clocks of a period more than those that every variant needs.
@@ -72,6 +75,10 @@ def survey_groups(method: Method, width: int) -> list[Group]:
     about the origin of any axis ratio and angle. A group that would take more than
     :data:`WHOLE_BUDGET` summations is a sample that takes up to :data:`SAMPLE_BUDGET`.
 
+    The exact interpolator of arcs runs all quarter arcs and circles, and a sample of 65,536 arcs,
+    of 12 bits 2,000,000, of radii up to 0.68 times 2^width, the largest that have room anywhere;
+    none that the device cannot know to be off the circle or out of the coordinates.
+
     On a carrier lines, quarter arcs, circles and arcs alike, but no ten turns, as many as take
     :data:`SAMPLE_BUDGET` clocks, their timing drawn from the seed; and behind some of them the same
     block with a timing that must be refused.
@@ -83,6 +90,8 @@ def survey_groups(method: Method, width: int) -> list[Group]:
     """
     if method.timed:
         return _timed_groups(method, width)
+    if method.exact and method.curve == "arc":
+        return _exact_arc_groups(width)
     if method.curve == "line":
         return _line_groups(width)
     return {"arc": _arc_groups, "conic": _conic_groups}[method.curve](method, width)
@@ -157,6 +166,38 @@ def _arc_groups(method: Method, width: int) -> list[Group]:
     ]
 
 
+def _exact_arc_groups(width: int) -> list[Group]:
+    top = (1 << width) - 1
+    # A circle takes 4·√2 steps for every step of its radius.
+    room = _room(width, "circle", lambda width: ceil(4 * sqrt(2) * 2**width))
+    circles = _pick(np.arange(1, top + 1), room)
+    spread = np.linspace(1, top, min(_TEN_TURNS, room // 10)).round()
+    count = min(_EXACT_ARCS.get(width, 1 << 16), 8 * room if width > 12 else 1 << 21)
+    random = np.random.default_rng(SEED)
+    radius = random.uniform(1, _EXACT_RADIUS * (1 << width), count)
+    low, high = np.ceil(radius) + 1 - (1 << width), (1 << width) - 2 - np.ceil(radius)
+    arcs = np.zeros((count, 8), dtype=np.int64)
+    for column in (0, 2):
+        angle = random.uniform(0, 2 * pi, count)
+        points = np.rint(radius * [np.cos(angle), np.sin(angle)]).T
+        arcs[:, column : column + 2] = points
+        # The end is rounded to whole steps from the circle of the rounded start.
+        radius = np.hypot(*points.T)
+    center = np.floor(random.uniform(low, high, (2, count))).astype(np.int64).T
+    arcs[:, 4:6] = center
+    arcs[:, :4] += np.tile(center, 2)
+    arcs[:, 6] = random.integers(0, 2, count)
+    return [
+        Group(title, blocks, np.zeros(len(blocks), dtype=np.int64), faster_steps(blocks))
+        for title, blocks in (
+            (_how_many(len(circles), top, "quarter arcs"), _about_origin(circles, quarter=True)),
+            (_how_many(len(circles), top, "circles"), _about_origin(circles)),
+            (f"ten turns of {len(spread)} circles", _about_origin(spread, full_turns=9)),
+            (f"a sample (seed {SEED}) of {count} arcs", arcs),
+        )
+    ]
+
+
 def _timed_groups(method: Method, width: int) -> list[Group]:
     models = [method.model(width, 2, **variant) for variant in method.variants()]
     least = max(model.least_period for model in models)
@@ -216,7 +257,7 @@ def _timed_group(
         bad[2::3, -1] = 0
     else:
         bad[2::3, -2] = angles(bad[2::3]) > 1
-        far = _faster_steps(blocks)
+        far = faster_steps(blocks)
     return Group(
         f"{title}, and {len(bad)} of bad timing",
         np.insert(blocks, behind + 1, bad, axis=0),
@@ -234,26 +275,7 @@ def _pick(candidates: np.ndarray, room: int) -> np.ndarray:
 
 def _arc_group(title: str, blocks: np.ndarray, width: int) -> Group:
     answers = refusals(blocks, width)
-    return Group(title, blocks, answers, np.where(answers == 0, _faster_steps(blocks), 0.0))
-
-
-def _radius(blocks: np.ndarray) -> np.ndarray:
-    start, _ = seen_from_center(blocks)
-    return np.hypot(*start.T.astype(float))
-
-
-def _faster_steps(blocks: np.ndarray) -> np.ndarray:
-    """Give the steps of the axis that moves faster: R·∫max(|cos φ|, |sin φ|) dφ."""
-    start, _ = seen_from_center(blocks)
-    begin = np.arctan2(start[:, 1] * np.where(blocks[:, 6] == 1, -1, 1), start[:, 0])
-
-    def integral(angle: np.ndarray) -> np.ndarray:
-        quarters, rest = np.divmod(angle, pi / 2)
-        part = np.where(rest < pi / 4, np.sin(rest), sqrt(2) - np.cos(rest))
-        return quarters * sqrt(2) + part
-
-    angle = np.radians(np.abs(swept(blocks)))
-    return _radius(blocks) * (integral(begin + angle) - integral(begin))
+    return Group(title, blocks, answers, np.where(answers == 0, faster_steps(blocks), 0.0))
 
 
 def _about_origin(radii: np.ndarray, *, quarter: bool = False, full_turns: int = 0) -> np.ndarray:
@@ -370,7 +392,7 @@ def whole_degrees(method: Method, width: int) -> list[Group]:
         (f"arcs all round, every {_STRIDE}th there is", _all_round(points)),
     ):
         group = _arc_group("", blocks, width)
-        right_angles = group.lengths / (sqrt(2) * _radius(blocks))
+        right_angles = group.lengths / (sqrt(2) * radii(blocks))
         chosen = _pick(np.arange(len(blocks)), int(room / right_angles.mean()))
         title = _how_many(len(chosen), len(blocks), what)
         groups.append(Group(title, blocks[chosen], group.answers[chosen], group.lengths[chosen]))

@@ -19,16 +19,19 @@ from discreta.hdl.conic import MAX_WIDTH as CONIC_MAX_WIDTH
 from discreta.hdl.conic import ORDERS as CONIC_ORDERS
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import MAX_WIDTH, Part
+from discreta.hdl.exact_arc import ExactArc
 from discreta.hdl.exact_line import ExactLine
 from discreta.hdl.linear import Linear
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
 from discreta.hdl.two_stage import two_stage_circular, two_stage_linear
+from discreta.sim.arcs import crossings, faster_steps, radii, refusals
 from discreta.sim.conics import motion
 from discreta.sim.golden.carrier_circular import CarrierCircular as GoldenCarrierCircular
 from discreta.sim.golden.carrier_linear import CarrierLinear as GoldenCarrierLinear
 from discreta.sim.golden.circular import Circular as GoldenCircular
 from discreta.sim.golden.comparison import Comparison as GoldenComparison
 from discreta.sim.golden.conic import Conic as GoldenConic
+from discreta.sim.golden.exact_arc import ExactArc as GoldenExactArc
 from discreta.sim.golden.exact_line import ExactLine as GoldenExactLine
 from discreta.sim.golden.linear import Linear as GoldenLinear
 from discreta.sim.golden.two_stage import TwoStage as GoldenTwoStage
@@ -123,6 +126,8 @@ class Method(Design):
         last step, alone and without stalls; ``blocks`` has shape (blocks, block fields).
     bound : callable
         ``bound(golden)``: the proven error bound of one model, in steps; None without one.
+    exact : bool
+        No step leads half a step off the curve, and what cannot be drawn so is not always refused.
     timed : bool
         It runs on a constant carrier: its blocks end with the fields ``periods`` and ``period``,
         and its golden models know their ``least_period``.
@@ -135,6 +140,7 @@ class Method(Design):
     clocks_per_step: str
     clocks: Callable[[Any, np.ndarray], np.ndarray]
     bound: Callable[[Any], float | None]
+    exact: bool = False
     timed: bool = False
     per_period: bool = False
 
@@ -174,6 +180,18 @@ def _circular_clocks(golden: GoldenCircular, blocks: np.ndarray) -> np.ndarray:
     pieces = 5 + 4 * blocks[:, 7]
     per_piece = (math.pi / 2 + 4) * 2.0 ** (bits + golden.guard)
     return (pieces * per_piece).astype(np.int64) + pieces + 2 * golden.width + 12
+
+
+def _exact_arc_clocks(golden: GoldenExactArc, blocks: np.ndarray) -> np.ndarray:
+    """One for every step and every change of octant or quadrant, and what stands around them.
+
+    An end that is off the circle may be missed: then the last quarter is run to its end.
+    """
+    pieces = crossings(blocks) + 1
+    missed = refusals(blocks, golden.width) != 0
+    quarters = math.sqrt(2) * (radii(blocks) + 2)
+    steps = np.where(missed, pieces * quarters, faster_steps(blocks))
+    return steps.astype(np.int64) + 4 * pieces + 10
 
 
 #: Steps beside the curve; and how far from the end one axis may be left to go alone, and how far
@@ -372,6 +390,21 @@ METHODS = {
             },
             clocks=_circular_clocks,
             bound=lambda _: None,
+        ),
+        Method(
+            name="exact_arc",
+            curve="arc",
+            summary="arc of any length, every step chosen by the circle's own residual",
+            error_bound="½, and the end exact",
+            clocks_per_step="1 a step, 1 more where the faster axis or a direction changes",
+            device=ExactArc,
+            golden=GoldenExactArc,
+            axes=(2,),
+            choices={},
+            settings={"default": {}},
+            clocks=_exact_arc_clocks,
+            bound=lambda _: 0.5,
+            exact=True,
         ),
         Method(
             name="conic",

@@ -19,7 +19,13 @@ import numpy as np
 from discreta.sim.arcs import seen_from_center
 from discreta.sim.compiled import CompiledModel
 from discreta.sim.conics import motion
-from discreta.sim.contour import ArcContour, ConicContour, Contour, LineContour
+from discreta.sim.contour import (
+    ArcContour,
+    ConicContour,
+    Contour,
+    ExactArcContour,
+    LineContour,
+)
 from discreta.sim.groups import SEED, Group
 from discreta.sim.methods import METHODS, Method
 from discreta.sim.points import say_point
@@ -203,6 +209,25 @@ class _Arcs:
         return arc, say_point(point)
 
 
+class _ExactArcs(_Arcs):
+    """Arcs of the exact interpolator."""
+
+    watch: tuple[str, ...] = ("running",)
+    cost: int = 16
+
+    def contour(self, blocks: np.ndarray) -> ExactArcContour:
+        """Compare with the circles."""
+        return ExactArcContour(blocks)
+
+    def clocks(self, method: Method, golden: Any, group: Group) -> np.ndarray:
+        """Give the most clocks that they can take, and few take fewer."""
+        return method.clocks(golden, group.blocks)
+
+    def completing(self, seen: dict[str, np.ndarray]) -> np.ndarray:
+        """Tell that there are no completing steps."""
+        return np.zeros(len(seen["running"]), dtype=bool)
+
+
 class _TimedLines(_Lines):
     """Lines in the plane on a carrier."""
 
@@ -294,8 +319,12 @@ _CURVES: dict[tuple[str, bool], _Curve] = {
 }
 
 
+_EXACT_ARCS = _ExactArcs()
+
+
 def _curve(method: Method) -> _Curve:
-    return _CURVES[method.curve, method.timed]
+    exact = method.exact and method.curve == "arc"
+    return _EXACT_ARCS if exact else _CURVES[method.curve, method.timed]
 
 
 def say_worst(method: Method, group: Group, row: SurveyRow) -> tuple[str, str]:

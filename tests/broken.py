@@ -19,6 +19,7 @@ from discreta.hdl.circular import Circular
 from discreta.hdl.comparison import Comparison
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import ErrorCode, Part
+from discreta.hdl.exact_arc import ExactArc
 from discreta.hdl.linear import Linear
 from discreta.hdl.two_stage import TwoStage
 from discreta.sim.golden.carrier_circular import CarrierCircular as GoldenCarrierCircular
@@ -111,6 +112,7 @@ SOUND = [
         "nothing: as in the lecture's block diagram",
         options=METHODS["circular"].settings["lecture"],
     ),
+    Variant(METHODS["exact_arc"], "sound exact arc", "nothing"),
     Variant(METHODS["conic"], "sound conic", "nothing: the default setting"),
     Variant(
         METHODS["conic"],
@@ -166,6 +168,7 @@ def _variant(
 
 
 _line, _arc = partial(_variant, "linear"), partial(_variant, "circular")
+_exact_arc = partial(_variant, "exact_arc")
 _conic = partial(_variant, "conic")
 _comparison = partial(_variant, "comparison")
 _carrier_line = partial(_variant, "carrier_linear")
@@ -1328,3 +1331,81 @@ def turning_misread(core: CarrierCircular) -> None:
             m.d.sync += core.next_clockwise.eq(clockwise)
 
     _amend(core, change)
+
+
+# Exact arcs: what a step adds, the changes of octant and quadrant, the end.
+
+
+def _clocked(part: Part, *assigned: tuple[Value, Any], when: Value | int = 1) -> None:
+    """Assign values to registers of a part, in place of its own, in the clocks told."""
+
+    def change(m: Module) -> None:
+        with m.If(when):
+            for register, value in assigned:
+                m.d.sync += register.eq(value)
+
+    _amend(part, change)
+
+
+@_exact_arc({*ALL})
+def octant_never_changed(core: ExactArc) -> None:
+    """Y leads as far as the axis."""
+    _clocked(core, (core.mode[1], 0))
+
+
+@_exact_arc({*ALL})
+def odd_forgotten(core: ExactArc) -> None:
+    """Where the octant changes Y − X is taken for even."""
+    _clocked(core, (core.odd, 0))
+
+
+@_exact_arc({*ALL})
+def rising_axis_not_turned(core: ExactArc) -> None:
+    """What rose up to an axis goes on rising behind it."""
+    _clocked(core, (core.negative["x"], core.negative["x"]), when=core.mode == 1)
+
+
+@_exact_arc({*ALL})
+def last_crossing_forgotten(core: ExactArc) -> None:
+    """With the last crossing the last piece does not begin."""
+    _clocked(core, (core.sole, 0))
+
+
+@_exact_arc({*ALL})
+def end_never_near(core: ExactArc) -> None:
+    """The end is not seen coming."""
+    _clocked(core, (core.near, 0))
+
+
+@_exact_arc({*ALL})
+def sign_not_complemented(core: ExactArc) -> None:
+    """An arc that begins where X leads loads E with its own sign."""
+    inp = core.input
+    _assign(inp, inp.residual[-1], inp.diagonal[-1] ^ inp.axial[-1])
+
+
+@_exact_arc({*ALL})
+def next_diagonal_added(core: ExactArc) -> None:
+    """What was loaded is added once more in the next clock."""
+    _clocked(core, (core.load_diagonal, core.input.diagonal), when=core.loading)
+
+
+@_exact_arc({*ALL} - {DOCUMENTS})
+def position_from_the_end(core: ExactArc) -> None:
+    """The position is taken for the end in the clock in which a step is taken."""
+    _assign(core, core.position.x, Mux(core.waiting & core.last, core.end["x"], core.past["x"]))
+
+
+# Only with the right stimuli: neither the documents nor the survey stalls or errs.
+
+
+@_exact_arc({*ALL} - {DOCUMENTS, COMPILED})
+def missed_end_not_seen(core: ExactArc) -> None:
+    """An arc that has missed its end runs on."""
+    _clocked(core, (core.lost, 0))
+
+
+@_exact_arc({*ALL} - {DOCUMENTS, COMPILED})
+def stalled_step_lost(core: ExactArc) -> None:
+    """A step that is not taken at once is forgotten."""
+    _clocked(core, (core.waiting, 0), when=core.waiting & ~core.steps.ready)

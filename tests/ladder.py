@@ -44,6 +44,7 @@ from tests.arcs import arc_steps, draw_arcs, fault, is_empty, seen
 from tests.broken import ALL, SOUND, VARIANTS, Variant
 from tests.conics import FIELDS, conic_steps, draw_conics
 from tests.conics import fault as conic_fault
+from tests.exact_arcs import exact_steps
 from tests.hdl.traces import golden_trace
 from tests.lines import article
 
@@ -192,6 +193,12 @@ def _arc_documents(core: Part, block: list[int]) -> list[_Said]:
         drawn += [(len(points) - 1, (xk, yk))] * (run.fate == lecture.WAITS)
         said.append(("the lecture", drawn))
     return said
+
+
+def _exact_arc_documents(core: Part, block: list[int]) -> list[_Said]:  # noqa: ARG001
+    """Read the rule: of the two points that may come next the one nearer to the circle."""
+    empty = block[:2] == block[2:4] == block[4:6]
+    return [("the rule", [] if empty else exact_steps(block))]
 
 
 def _conic_documents(core: Part, block: list[int]) -> list[_Said]:
@@ -490,6 +497,7 @@ _FIELDS["timed arc"] = (*_FIELDS["arc"], "periods", "period")
 _DOCUMENTS = {
     "line": (_lines(), _line_documents),
     "arc": (_sound_arcs(), _arc_documents),
+    "exact_arc": (_sound_arcs(), _exact_arc_documents),
     "conic": (_sound_conics(), _conic_documents),
     "comparison": (_lines(), _comparison_documents),
     "carrier_linear": (_timed_lines(), _carrier_line_documents),
