@@ -958,7 +958,7 @@ def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
             ):
                 show(done, len(jobs))
                 what = "every variant" if variant is None else say_choices(variant)
-                out.print(f"{method.name}, width {width}, {what}")
+                out.print(", ".join(filter(None, (f"{method.name}, width {width}", what))))
                 for verdict in verdicts:
                     kind = "checked" if verdict.exhaustive else "proven"
                     mark = kind if verdict.holds else "FAILED"

@@ -125,6 +125,7 @@ class ExactLine(Part):
         ways = {
             **{f"start_{a}": wide for a in self.letters},
             **{f"delta_{a}": wide for a in self.letters},
+            **{f"beyond_{a}": 1 for a in self.letters},
         }
         starts = {f"ready_start_{a}": wide for a in self.letters}
         negatives = {f"ready_negative_{a}": 1 for a in self.letters}
@@ -144,9 +145,10 @@ class ExactLine(Part):
                 "waiting": 1,
                 "last": 1,
                 **{f"pulse_{a}": 1 for a in self.letters},
+                **{f"down_{a}": 1 for a in self.letters},
                 **{f"direction_{a}": 1 for a in self.letters},
             },
-            "block accepted": {"open": 1, "pending": 1, "weighed": 1, "fault": 1, **ways},
+            "block accepted": {"open": 1, "pending": 1, "weighed": 1, **ways},
             "block prepared": {
                 "prepared": 1,
                 "refused": 1,
@@ -258,19 +260,24 @@ class ExactLine(Part):
             moved = {a: moves[f"_{a}"] for a in self.letters}
         for a in self.letters:
             place, pulse, direction = self.place[a], r[f"pulse_{a}"], r[f"direction_{a}"]
-            # What is added comes from a register.
-            way = Cat(Const(1, 1), direction.replicate(self.width)).as_signed()
-            with m.If(r["loaded"] & go):
-                m.d.sync += place.eq(r[f"begin_{a}"])
-            with m.Elif(taken & pulse):
-                m.d.sync += place.eq(place + way)
+            down = r[f"down_{a}"]
             m.d.comb += [
                 self.position[a].eq(place),
-                self.steps.payload[a][0].eq(pulse),
-                self.steps.payload[a][1].eq(pulse & direction),
+                self.steps.payload[a].eq(Cat(pulse, down).as_signed()),
             ]
             with m.If(go):
-                m.d.sync += pulse.eq(r["running"] & moved[a])
+                m.d.sync += [
+                    # What waits is taken now; where nothing does, nothing is added.
+                    place.eq(
+                        Mux(
+                            r["loaded"],
+                            r[f"begin_{a}"],
+                            place + Cat(pulse, down.replicate(self.width)).as_signed(),
+                        )
+                    ),
+                    pulse.eq(r["running"] & moved[a]),
+                    down.eq(r["running"] & moved[a] & direction),
+                ]
                 with m.If(r["loaded"]):
                     m.d.sync += direction.eq(r[f"negative_{a}"])
         stages = ("pending", "prepared", "refused", "waiting")
@@ -284,7 +291,6 @@ class ExactLine(Part):
         block = self.blocks.payload
         accept, stays = Signal(name="accept"), Signal(name="stays")
         held = r["chosen"] & ~room if self.axes == 2 else 0
-        fault = Signal(self.axes, name="too_long")
         m.d.comb += [
             self.blocks.ready.eq(r["open"]),
             accept.eq(self.blocks.valid & r["open"]),
@@ -295,16 +301,14 @@ class ExactLine(Part):
             # In the plane a block leaves in its second clock if there is room then.
             r["open"].eq(~accept & (~stays | (~held if self.axes == 2 else 0))),
         ]
-        with m.If(accept):
-            m.d.sync += r["fault"].eq(fault.any())
-        for index, a in enumerate(self.letters):
+        for a in self.letters:
             delta = Signal(signed(n + 2), name=f"way_{a}")
-            m.d.comb += [
-                delta.eq(block.end[a] - block.start[a]),
-                fault[index].eq(delta[n] != delta[n + 1]),
-            ]
+            m.d.comb += delta.eq(block.end[a] - block.start[a])
             with m.If(accept):
-                m.d.sync += [r[f"start_{a}"].eq(block.start[a]), r[f"delta_{a}"].eq(delta)]
+                m.d.sync += [
+                    r[f"start_{a}"].eq(block.start[a]),
+                    Cat(r[f"delta_{a}"], r[f"beyond_{a}"]).eq(delta),
+                ]
         if self.axes == 2:
             x, y = r["delta_x"], r["delta_y"]
             m.d.sync += [
@@ -312,6 +316,11 @@ class ExactLine(Part):
                 r["sum_down"].eq((x + y)[-1]),
                 r["difference_down"].eq((x - y)[-1]),
             ]
+
+    def _too_long(self) -> Value:
+        """Tell whether a way of the block that came last does not fit n + 1 bits."""
+        r = self.registers
+        return Cat(r[f"beyond_{a}"] != r[f"delta_{a}"][-1] for a in self.letters).any()
 
     def _choose(self, m: Module, leaves: Value, room: Value) -> None:
         """Tell leader and follower of the plane apart."""
@@ -326,7 +335,7 @@ class ExactLine(Part):
         with m.If(leaves):
             m.d.sync += [
                 r["chosen"].eq(1),
-                r["way_fault"].eq(r["fault"]),
+                r["way_fault"].eq(self._too_long()),
                 r["way_follow"].eq(Mux(follow_x, x, y)),
                 # An inverted operand is free here, and not in front of an adder.
                 r["way_lead"].eq(Mux(follow_x, y, x) ^ same.replicate(self.width + 1)),
@@ -396,9 +405,9 @@ class ExactLine(Part):
         reach = r["reach"]
         with m.If(takes):
             m.d.sync += [
-                r["prepared"].eq((reach != 0) & ~reach[n] & ~r["fault"]),
-                r["refused"].eq((reach == 0) | reach[n] | r["fault"]),
-                r["ready_fault"].eq(r["fault"] | reach[n]),
+                r["prepared"].eq((reach != 0) & ~reach[n] & ~self._too_long()),
+                r["refused"].eq((reach == 0) | reach[n] | self._too_long()),
+                r["ready_fault"].eq(self._too_long() | reach[n]),
                 r["ready_lead"].eq(reach),
             ]
             for a in self.letters:

@@ -127,7 +127,7 @@ class Method(Design):
     bound : callable
         ``bound(golden)``: the proven error bound of one model, in steps; None without one.
     exact : bool
-        No step leads half a step off the curve, and what cannot be drawn so is not always refused.
+        No step leads half a step off the curve; a method that is in none of the documents.
     timed : bool
         It runs on a constant carrier: its blocks end with the fields ``periods`` and ``period``,
         and its golden models know their ``least_period``.
@@ -329,6 +329,7 @@ METHODS = {
             settings={"default": {}},
             clocks=_exact_line_clocks,
             bound=lambda golden: math.sqrt(golden.axes - 1) / 2,
+            exact=True,
         ),
         Method(
             name="linear",

@@ -70,14 +70,15 @@ class ExactLine:
         kinds: dict[str, tuple[int, bool]] = {self.left: wide}
         for a in self.letters:
             kinds |= {self.place(a): wide, f"pulse_{a}": bit, f"direction_{a}": bit}
-            kinds |= {f"start_{a}": wide, f"delta_{a}": wide}
+            kinds[f"down_{a}"] = bit
+            kinds |= {f"start_{a}": wide, f"delta_{a}": wide, f"beyond_{a}": bit}
             kinds |= {f"ready_start_{a}": wide, f"ready_negative_{a}": bit}
             kinds |= {f"begin_{a}": wide, f"negative_{a}": bit}
         for f in self.followers:
             kinds |= dict.fromkeys((f"gain{f}", f"loss{f}", f"total{f}", f"addend{f}"), wide)
             kinds |= dict.fromkeys((f"often{f}", f"first{f}", f"rare{f}"), bit)
             kinds |= dict.fromkeys((f"ready_gain{f}", f"ready_loss{f}", f"ready_rest{f}"), wide)
-        flags = ("open", "pending", "weighed", "fault", "prepared", "refused", "ready_fault")
+        flags = ("open", "pending", "weighed", "prepared", "refused", "ready_fault")
         flags += (
             "one",
             "idle",
@@ -121,8 +122,7 @@ class ExactLine:
             "error": state["error"],
         }
         for a in self.letters:
-            way = where(state[f"direction_{a}"], -1, 1)
-            out[f"steps_{a}"] = where(state[f"pulse_{a}"], way, 0)
+            out[f"steps_{a}"] = self._step(state, a)
             out[f"position_{a}"] = state[self.place(a)]
         return out
 
@@ -185,14 +185,14 @@ class ExactLine:
                 pulse = where(follows, moves[""], 1)
             else:
                 pulse = moves[f"_{a}"]
-            goes(f"pulse_{a}", state["running"] & pulse)
-            negative = state[f"negative_{a}"]
-            goes(f"direction_{a}", where(state["loaded"], negative, state[f"direction_{a}"]))
-            way = where(state[f"direction_{a}"], -1, 1)
-            moved = where(waiting & ready & state[f"pulse_{a}"], way, 0)
-            place = self._wrap(state[self.place(a)] + moved)
-            begins = state["loaded"] & go
-            after[self.place(a)] = where(begins, state[f"begin_{a}"], place)
+            pulse = state["running"] & pulse
+            direction = state[f"direction_{a}"]
+            goes(f"pulse_{a}", pulse)
+            goes(f"down_{a}", pulse & direction)
+            goes(f"direction_{a}", where(state["loaded"], state[f"negative_{a}"], direction))
+            # A step that waits is taken; where none does it is 0.
+            moved = self._wrap(state[self.place(a)] + self._step(state, a))
+            goes(self.place(a), where(state["loaded"], state[f"begin_{a}"], moved))
         if self.axes == 2:
             follows = where(state["loaded"], state["follow_x"], state["follows_x"])
             goes("follows_x", follows)
@@ -227,14 +227,14 @@ class ExactLine:
         """Take in a block: its ways, and whether they fit."""
         after: State = {}
         accept = inputs["blocks_valid"] & state["open"]
-        fault: Value = 0
         for a in self.letters:
             begin = inputs[f"blocks_start_{a}"]
             delta = inputs[f"blocks_end_{a}"] - begin
-            fault = fault | less(delta, -(2**self.width)) | negate(less(delta, 2**self.width))
+            # The sign that its n + 1 bits may lose.
+            beyond = less(delta, 0)
+            after[f"beyond_{a}"] = where(accept, beyond, state[f"beyond_{a}"])
             after[f"start_{a}"] = where(accept, begin, state[f"start_{a}"])
             after[f"delta_{a}"] = where(accept, self._wrap(delta), state[f"delta_{a}"])
-        after["fault"] = where(accept, fault, state["fault"])
         stays = state["pending"] & negate(leaves)
         after["pending"] = accept | stays
         after["open"] = negate(accept | stays)
@@ -276,7 +276,7 @@ class ExactLine:
             "way_lead": where(same, -1 - lead, lead),
             "way_follow_x": follow_x,
             "way_same": same,
-            "way_fault": state["fault"],
+            "way_fault": self._too_long(state),
         }
         for a in self.letters:
             values[f"way_start_{a}"] = state[f"start_{a}"]
@@ -309,7 +309,7 @@ class ExactLine:
                 values[f"ready_start_{a}"] = state[f"start_{a}"]
                 values[f"ready_negative_{a}"] = less(delta, 0)
             values["ready_lead"] = self._wrap(length)
-            fault = state["fault"]
+            fault = self._too_long(state)
         for f, (way, against) in ways.items():
             values[f"ready_gain{f}"] = way
             values[f"ready_loss{f}"] = self._wrap(way + against)
@@ -332,6 +332,17 @@ class ExactLine:
     def _leaves(self, state: State) -> Value:
         """Tell whether the block of the plane that came last leaves its place."""
         return state["weighed"] & negate(state["chosen"])
+
+    def _step(self, state: State, a: str) -> Value:
+        """Give the step of an axis that waits."""
+        return state[f"pulse_{a}"] - 2 * state[f"down_{a}"]
+
+    def _too_long(self, state: State) -> Value:
+        """Tell whether a way of the block that came last does not fit n + 1 bits."""
+        fault: Value = 0
+        for a in self.letters:
+            fault = fault | (state[f"beyond_{a}"] ^ less(state[f"delta_{a}"], 0))
+        return fault
 
     def _length(self, way: Value) -> Value:
         return where(less(way, 0), 0 - way, way)

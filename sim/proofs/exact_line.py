@@ -193,12 +193,12 @@ class _Clock:
     def accepted(self, state: dict, ghosts: dict) -> dict[str, z3.BoolRef]:
         """Give what is true of the block that came last, and of the one chosen."""
         pending = state["pending"] == 1
-        fits = z3.And(pending, state["fault"] == 0)
-        facts = {
-            "fault": z3.Implies(
-                pending, (state["fault"] == 1) == self.too_long(ghosts, "in", False)
-            )
-        }
+        one = z3.BitVecVal(1, self.wide)
+        fault = z3.Or(
+            [state[f"beyond_{a}"] != z3.If(state[f"delta_{a}"] < 0, one, 0) for a in self.letters]
+        )
+        fits = z3.And(pending, z3.Not(fault))
+        facts = {"fault": z3.Implies(pending, fault == self.too_long(ghosts, "in", False))}
         for a in self.letters:
             facts[f"accepted {a}"] = z3.Implies(
                 pending, state[f"start_{a}"] == ghosts[f"begin_in_{a}"]
@@ -449,7 +449,13 @@ class _Clock:
                 ),
             ),
             "nothing waits, nothing moves": z3.And(
-                [z3.Implies(state["waiting"] == 0, state[f"pulse_{a}"] == 0) for a in self.letters]
+                [
+                    z3.And(
+                        z3.Implies(state["waiting"] == 0, state[f"pulse_{a}"] == 0),
+                        state[f"down_{a}"] == state[f"pulse_{a}"] & state[f"direction_{a}"],
+                    )
+                    for a in self.letters
+                ]
             ),
         }
         for a in self.letters:
