@@ -83,7 +83,7 @@ class ExactArcInput(Part):
         registers: dict[str, Signal] = {}
 
         def register(name: str, shape: object = 1) -> Signal:
-            registers[name] = signal = Signal(shape, name=name)  # pyright: ignore[reportArgumentType]
+            registers[name] = signal = Signal(shape, name=name)
             return signal
 
         self.held_register = register("held")

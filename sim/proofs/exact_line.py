@@ -41,10 +41,11 @@ class _Clock:
         wide = n + 6
         self.wide = wide
         coordinate = (n + 1, True)
+        ports: dict[str, tuple[int, bool]]
         ports = {f"blocks_{p}_{a}": coordinate for p in ("start", "end") for a in self.letters}
-        flags = dict.fromkeys(("blocks_valid", "steps_ready"), (1, False))
+        ports |= dict.fromkeys(("blocks_valid", "steps_ready"), (1, False))
         self.state = symbols(golden.registers(), wide)
-        self.inputs = symbols(ports | flags, wide)
+        self.inputs = symbols(ports, wide)
         ghosts = {
             f"{p}_{stage}_{a}": coordinate
             for stage in STAGES
