@@ -1,0 +1,405 @@
+"""Golden model of the exact interpolator of second-order curves, one clock at a time, in integers.
+
+Written from the design's own method: the faster axis steps every clock, and the sign of the curve's
+residual between the two points that it can lead to decides whether the other one steps, too. As
+described of ``discreta.hdl.exact_conic.ExactConic``, whose letters are used here.
+
+The same source runs on integers, NumPy arrays and SMT bit-vectors (see
+:mod:`discreta.sim.golden.logic`). It knows nothing of the RTL. State and inputs are dicts by
+register and port name.
+
+Registers: of the block that runs ``residual``, ``axial``, ``across`` (its residual and what moves
+it), ``alpha``, ``beta``, ``gamma`` (A, B and C as seen along the path), ``to_residual``,
+``to_axial``, ``to_across`` (constants of the change to come), ``steep``, ``slows``, ``diagonal``,
+``turning``, ``turns``, P1 to P4, XT, YT; ``running``, ``done``, ``error``, ``late`` of УУ;
+``pulse_x/y`` and ``direction_x/y`` of the step that waits. Of the block that is prepared ``a`` to
+``e``, ``gx``, ``gy``, ``bend``, ``clockwise``, those that begin with ``next_``, ``still_x/y``,
+``leads_x``, ``tie``, ``held``, ``fault``, ``tick``.
+"""
+
+from dataclasses import dataclass
+
+from discreta.sim.golden.logic import Value, equal, less, negate, where
+
+__all__ = ["TURNS_BITS", "ExactConic"]
+
+State = dict[str, Value]
+
+RANGE, OFF_CURVE, SHARP = 1, 2, 3
+TURNS_BITS = 11
+
+
+@dataclass(frozen=True)
+class ExactConic:
+    """The exact interpolator of second-order curves of n = ``width`` bits, 4 to 24."""
+
+    width: int = 16
+
+    @property
+    def bits(self) -> int:
+        """Bits of the derivatives, signed."""
+        return 2 * self.width + 7
+
+    @property
+    def residual_bits(self) -> int:
+        """Bits of the residual, signed."""
+        return 2 * self.width + 9
+
+    @property
+    def last_tick(self) -> int:
+        """The last clock of a preparation."""
+        return self.width + 9
+
+    def registers(self) -> dict[str, tuple[int, bool]]:
+        """Give the width in bits of every register and whether it is signed."""
+        n = self.width
+        point, way, square = (n + 1, True), (n + 2, True), (n + 4, True)
+        flag = (1, False)
+        kinds: dict[str, tuple[int, bool]] = {
+            "p1": point,
+            "p2": point,
+            "p3": way,
+            "p4": way,
+            "residual": (self.residual_bits, True),
+            "axial": (self.bits + 1, True),
+            "across": (self.bits, True),
+            "alpha": square,
+            "beta": (n + 5, True),
+            "gamma": square,
+            **dict.fromkeys(("to_residual", "to_axial", "to_across"), (n + 7, True)),
+            **dict.fromkeys(("steep", "slows", "diagonal", "turning"), flag),
+            "turns": (TURNS_BITS, False),
+            "xt": point,
+            "yt": point,
+            "running": flag,
+            "done": flag,
+            "error": (2, False),
+            "late": (2, False),
+            **dict.fromkeys(("pulse_x", "pulse_y", "direction_x", "direction_y"), flag),
+        }
+        return kinds | {
+            "held": flag,
+            "fault": (2, False),
+            "tick": (self.last_tick.bit_length(), False),
+            "a": square,
+            "b": (n + 5, True),
+            "c": square,
+            "d": (2 * n + 5, True),
+            "e": (2 * n + 5, True),
+            "gx": (self.bits + 1, True),
+            "gy": (self.bits, True),
+            "bend": (n + 6, False),
+            "next_residual": (self.residual_bits, True),
+            "clockwise": flag,
+            **dict.fromkeys(("still_x", "still_y", "leads_x", "tie"), flag),
+            **dict.fromkeys(("next_down_x", "next_down_y", "next_steep", "next_slows"), flag),
+            "next_turns": (TURNS_BITS, False),
+            "next_x": point,
+            "next_y": point,
+            "next_p3": way,
+            "next_p4": way,
+        }
+
+    def reset(self) -> State:
+        """Give the state after reset: all registers are 0."""
+        return dict.fromkeys(self.registers(), 0)
+
+    def outputs(self, state: State) -> dict[str, Value]:
+        """Give what the ports show in a state."""
+        waiting = state["pulse_x"] | state["pulse_y"]
+        out = {
+            "blocks_ready": negate(state["held"]),
+            "steps_valid": waiting,
+            "steps_last": negate(state["running"]),
+            "busy": state["held"] | state["running"] | waiting,
+            "done": state["done"],
+            "error": state["error"] | state["late"],
+            "position_x": state["xt"],
+            "position_y": state["yt"],
+        }
+        for k in "xy":
+            out[f"steps_{k}"] = where(state[f"pulse_{k}"], where(state[f"direction_{k}"], -1, 1), 0)
+        return out
+
+    def step(self, state: State, inputs: dict[str, Value]) -> State:
+        """Give the state after one clock.
+
+        ``inputs``: ``blocks_valid``, ``blocks_a`` … ``blocks_e``, ``blocks_start_x/y``,
+        ``blocks_end_x/y``, ``blocks_clockwise``, ``blocks_turns``, ``steps_ready``.
+        """
+        outputs = self.outputs(state)
+        waiting = outputs["steps_valid"]
+        taken = waiting & inputs["steps_ready"]
+        free = negate(waiting) | inputs["steps_ready"]
+        sound = equal(state["fault"], 0)
+        no_way = equal(state["next_p3"], 0) & equal(state["next_p4"], 0)
+        empty = equal(state["next_turns"], 0) & no_way
+        next_may = where(empty | negate(sound), negate(waiting), free)
+        start = state["held"] & equal(state["tick"], 0) & negate(state["running"]) & next_may
+        load = start & sound
+        accept = inputs["blocks_valid"] & outputs["blocks_ready"]
+        clock = state["running"] & free
+
+        after = dict(state)
+        ends = self._run(state, after, clock)
+        # The position moves with the step that is taken, not with the one that waits.
+        for k in "xy":
+            move = where(state[f"direction_{k}"], -1, 1)
+            moved = state[f"{k}t"] + where(taken & state[f"pulse_{k}"], move, 0)
+            after[f"{k}t"] = self._signed(moved, self.width + 1)
+            kept = where(taken, 0, state[f"pulse_{k}"])
+            after[f"pulse_{k}"] = where(clock, after[f"pulse_{k}"], kept)
+        self._load(state, after, load)
+        after["running"] = where(load, negate(empty), where(ends["ended"], 0, state["running"]))
+        last_taken = taken & negate(state["running"])
+        after["done"] = last_taken | (load & empty) | ends["stepless"]
+        after["error"] = where(start, state["fault"], 0)
+        after["late"] = ends["late"]
+
+        self._prepare(state, after, empty)
+        received = {k: inputs[f"blocks_{k}"] for k in ("a", "b", "c", "d", "e", "clockwise")}
+        received |= {
+            "next_x": inputs["blocks_start_x"],
+            "next_y": inputs["blocks_start_y"],
+            "next_p3": inputs["blocks_end_x"],
+            "next_p4": inputs["blocks_end_y"],
+            "next_turns": inputs["blocks_turns"],
+            "fault": 0,
+            "gx": 0,
+            "gy": 0,
+            "tick": 1,
+        }
+        after |= {name: where(accept, value, after[name]) for name, value in received.items()}
+        after["held"] = where(accept, 1, where(start, 0, state["held"]))
+        return after
+
+    def _run(self, state: State, after: State, clock: Value) -> dict[str, Value]:
+        """One clock pulse of УУ, if there is one; give how it ends the block, if it does."""
+        n = self.width
+        steep, slows, diagonal = state["steep"], state["slows"], state["diagonal"]
+        down = {k: state[f"direction_{k}"] for k in "xy"}
+        left = {"x": state["p3"], "y": state["p4"]}
+        place = {"x": state["p1"], "y": state["p2"]}
+        last, few = equal(state["turns"], 0), less(state["turns"], 2)
+
+        # The end: near, or behind.
+        close = [negate(less(left[k], -1)) & less(left[k], 2) for k in "xy"]
+        near = few & close[0] & close[1]
+        here = equal(left["x"], 0) & equal(left["y"], 0)
+        passed = [where(down[k], less(1, left[k]), less(left[k], -1)) for k in "xy"]
+        missed = last & negate(near) & (passed[0] | passed[1])
+        event = state["turning"]
+        steps = {"x": negate(steep) | diagonal, "y": steep | diagonal}
+        edge = {k: equal(place[k], where(down[k], -(2**n), 2**n - 1)) for k in "xy"}
+        outside = (steps["x"] & edge["x"]) | (steps["y"] & edge["y"])
+        outside = negate(near | missed | event) & outside
+        late = where(missed, OFF_CURVE, where(outside, RANGE, 0))
+        goes = negate(near | missed | event | outside)
+
+        flip, swap = event & slows, event & negate(slows)
+        for k, p, way in (("x", "p1", "p3"), ("y", "p2", "p4")):
+            pulse = where(near, negate(equal(left[k], 0)), goes & steps[k])
+            move = where(near, left[k], where(goes & steps[k], where(down[k], -1, 1), 0))
+            minor = negate(steep) if k == "y" else steep
+            self._set(after, clock, p, self._signed(place[k] + move, n + 1))
+            self._set(after, clock, way, self._signed(left[k] - move, n + 2))
+            after[f"pulse_{k}"] = pulse
+            turned = where(near, less(left[k], 0), down[k] ^ (flip & minor))
+            self._set(after, clock, f"direction_{k}", turned)
+        for name, value in self._summed(state).items():
+            self._set(after, clock, name, value)
+        ended = clock & (near | missed | outside)
+        self._set(after, clock, "turns", (state["turns"] - flip) & (2**TURNS_BITS - 1))
+        self._set(after, clock, "steep", steep ^ swap)
+        self._set(after, clock, "slows", slows ^ event)
+        return {
+            "ended": ended,
+            "stepless": clock & near & here,
+            "late": where(clock, late, 0),
+        }
+
+    def _summed(self, state: State) -> State:
+        """Give what one clock makes of the residual and of what belongs to it.
+
+        What it makes of them in the clock that ends the block does not matter.
+        """
+        residual, axial, across = state["residual"], state["axial"], state["across"]
+        alpha, beta, gamma = state["alpha"], state["beta"], state["gamma"]
+        slows, diagonal, event = state["slows"], state["diagonal"], state["turning"]
+
+        # A step: the residuals of the middles ahead of it, from row to row.
+        straight = self._residual(residual + axial)
+        aslant = self._residual(straight + 2 * across)
+        beyond = where(slows, 0 - 2 * across, 4 * across) + 4 * gamma
+        beyond = self._residual(straight + beyond)
+        stepped = {
+            "residual": where(diagonal, aslant, straight),
+            "axial": axial + 4 * alpha + where(diagonal, 2 * beta, 0),
+            "across": across + beta + where(diagonal, 2 * gamma, 0),
+            "alpha": alpha,
+            "beta": beta,
+            "gamma": gamma,
+        }
+        # The curve passes beside both points that the step after this one can lead to.
+        outer = where(slows ^ diagonal, beyond, where(slows, straight, aslant))
+        leaves = negate(less(outer, 0)) & negate(slows & equal(state["turns"], 0))
+
+        # A change of the direction, or of the axis that is faster.
+        to_residual, to_axial, to_across = (
+            state[f"to_{name}"] for name in ("residual", "axial", "across")
+        )
+        flipped = {
+            "residual": residual - 2 * across + to_residual,
+            "axial": axial + to_axial,
+            "across": to_across - across,
+            "alpha": alpha,
+            "beta": 0 - beta,
+            "gamma": gamma,
+        }
+        swapped = {
+            "residual": residual + across - (axial >> 1) + to_residual,
+            "axial": 2 * across + to_axial,
+            "across": (axial >> 1) + to_across,
+            "alpha": gamma,
+            "beta": beta,
+            "gamma": alpha,
+        }
+        kinds = self.registers()
+        after = {
+            name: self._signed(
+                where(event, where(slows, flipped[name], swapped[name]), value), kinds[name][0]
+            )
+            for name, value in stepped.items()
+        }
+        after["turning"] = where(event, 0, leaves)
+        after["diagonal"] = negate(less(after["residual"], 0) ^ slows ^ event)
+        half = {name: state[name] >> 1 for name in ("alpha", "beta", "gamma")}
+        constants = {
+            "to_residual": (
+                2 * beta + 4 * gamma,
+                alpha - 2 * beta + half["alpha"] + half["beta"] - half["gamma"],
+            ),
+            "to_axial": (0 - 2 * beta, 2 * gamma - 3 * beta),
+            "to_across": (4 * gamma, 2 * beta - alpha - half["beta"]),
+        }
+        for name, values in constants.items():
+            after[name] = self._signed(where(slows, *values), kinds[name][0])
+        return after
+
+    def _load(self, state: State, after: State, load: Value) -> None:
+        """Take the prepared block over."""
+        loaded = {
+            "p1": state["next_x"],
+            "p2": state["next_y"],
+            "xt": state["next_x"],
+            "yt": state["next_y"],
+            "p3": state["next_p3"],
+            "p4": state["next_p4"],
+            "residual": state["next_residual"],
+            "axial": state["gx"],
+            "across": state["gy"],
+            "alpha": state["a"],
+            "beta": state["b"],
+            "gamma": state["c"],
+            "steep": state["next_steep"],
+            "slows": state["next_slows"],
+            "diagonal": negate(less(state["next_residual"], 0) ^ state["next_slows"]),
+            "turning": 0,
+            "turns": state["next_turns"],
+            "direction_x": state["next_down_x"],
+            "direction_y": state["next_down_y"],
+        }
+        for name, value in loaded.items():
+            self._set(after, load, name, value)
+
+    def _prepare(self, state: State, after: State, empty: Value) -> None:
+        """Horner's rule, bit by bit; then the frame of the first piece and the first residual."""
+        n, tick = self.width, state["tick"]
+        a, b, c, gx, gy = (state[k] for k in ("a", "b", "c", "gx", "gy"))
+        multiplies = less(0, tick) & less(tick, n + 2)
+        at = {k: equal(tick, n + k) for k in range(2, 10)}
+        bits = self.bits
+
+        x_bit, y_bit = ((state[p] >> n) & 1 for p in ("next_x", "next_y"))
+        widths = {"gx": bits + 1, "gy": bits, "next_residual": self.residual_bits}
+        for g, x_scale, y_scale in (("gx", 2 * a, b), ("gy", b, 2 * c)):
+            digit = where(x_bit, x_scale, 0) + where(y_bit, y_scale, 0)
+            grown = 2 * state[g] + where(equal(tick, 1), 0 - digit, digit)
+            self._set(after, multiplies, g, self._signed(grown, widths[g]))
+        for p in ("next_x", "next_y"):
+            turned = self._signed(2 * state[p] + ((state[p] >> n) & 1), n + 1)
+            self._set(after, multiplies, p, turned)
+
+        for g, rest in (("gx", "d"), ("gy", "e")):
+            self._set(after, at[2], g, self._signed(state[g] + state[rest], widths[g]))
+        for way, p in (("next_p3", "next_x"), ("next_p4", "next_y")):
+            self._set(after, at[2], way, self._signed(state[way] - state[p], n + 2))
+
+        rising, falling = gx + gy, gx - gy
+        bend_bits = 2 ** (n + 6) - 1
+        self._set(after, at[3], "still_x", equal(gy, 0))
+        self._set(after, at[3], "still_y", equal(gx, 0))
+        self._set(after, at[3], "leads_x", less(rising, 0) ^ less(falling, 0))
+        self._set(after, at[3], "tie", equal(rising, 0) | equal(falling, 0))
+        self._set(after, at[3], "bend", (_size(a) + _size(c)) & bend_bits)
+
+        cw, still_x, still_y = (state[k] for k in ("clockwise", "still_x", "still_y"))
+        below_x = where(cw, less(gy, 0), less(0, gy))
+        below_y = where(cw, less(0, gx), less(gx, 0))
+        down_x = where(still_x, negate(below_y) ^ cw, below_x)
+        down_y = where(still_y, below_x ^ cw, below_y)
+        # The axes in turn speed up and slow down; of two that are as fast as each other the one
+        # leads that does not slow down.
+        x_slows = negate(down_x ^ down_y ^ cw)
+        leads_x = where(state["tie"], negate(x_slows), state["leads_x"])
+        self._set(after, at[4], "next_down_x", down_x)
+        self._set(after, at[4], "next_down_y", down_y)
+        self._set(after, at[4], "next_steep", negate(leads_x))
+        self._set(after, at[4], "next_slows", x_slows ^ leads_x)
+        self._set(after, at[4], "bend", (state["bend"] + _size(b)) & bend_bits)
+
+        steep, slows = state["next_steep"], state["next_slows"]
+        ahead_x = where(state["next_down_x"], 0 - gx, gx)
+        ahead_y = where(state["next_down_y"], 0 - gy, gy)
+        opposed = state["next_down_x"] ^ state["next_down_y"]
+        seen = {
+            "gx": self._signed(where(steep, ahead_y, ahead_x), bits + 1),
+            "gy": self._signed(where(steep, ahead_x, ahead_y), bits),
+            "a": where(steep, c, a),
+            "b": self._signed(where(opposed, 0 - b, b), n + 5),
+            "c": where(steep, a, c),
+        }
+        for name, value in seen.items():
+            self._set(after, at[5], name, value)
+
+        size = where(slows, gy - gx, gx - gy)
+        sharp = less(size, 4 * state["bend"]) | (still_x & still_y)
+        self._set(after, at[6] & negate(empty) & sharp, "fault", SHARP)
+        total = state["next_residual"]
+        sums = {
+            "gx": {6: 2 * gx + 4 * a, 7: gx + 2 * a, 8: gx + b},
+            "gy": {6: gy + 2 * b, 7: gy + 2 * c},
+            "next_residual": {6: 2 * gx + gy, 7: total + 2 * a, 8: total + b, 9: total + (c >> 1)},
+        }
+        for name, values in sums.items():
+            for k, value in values.items():
+                self._set(after, at[k], name, self._signed(value, widths[name]))
+        counted = (tick + 1) & (2 ** self.last_tick.bit_length() - 1)
+        after["tick"] = where(at[9] | equal(tick, 0), 0, counted)
+
+    def _set(self, after: State, condition: Value, name: str, value: Value) -> None:
+        """Let a register have a value where the condition holds."""
+        after[name] = where(condition, value, after[name])
+
+    def _residual(self, value: Value) -> Value:
+        """Keep a residual to its bits."""
+        return self._signed(value, self.residual_bits)
+
+    def _signed(self, value: Value, bits: int) -> Value:
+        """Keep a number to its signed bits."""
+        half = 2 ** (bits - 1)
+        return ((value + half) & (2 * half - 1)) - half
+
+
+def _size(value: Value) -> Value:
+    return where(less(value, 0), 0 - value, value)
