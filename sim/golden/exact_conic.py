@@ -156,7 +156,7 @@ class ExactConic:
         after["error"] = where(start, state["fault"], 0)
         after["late"] = ends["late"]
 
-        self._prepare(state, after, empty)
+        self._prepare(state, after, where(accept, 0, state["tick"]), empty)
         received = {k: inputs[f"blocks_{k}"] for k in ("a", "b", "c", "d", "e", "clockwise")}
         received |= {
             "next_x": inputs["blocks_start_x"],
@@ -312,9 +312,9 @@ class ExactConic:
         for name, value in loaded.items():
             self._set(after, load, name, value)
 
-    def _prepare(self, state: State, after: State, empty: Value) -> None:
+    def _prepare(self, state: State, after: State, tick: Value, empty: Value) -> None:
         """Horner's rule, bit by bit; then the frame of the first piece and the first residual."""
-        n, tick = self.width, state["tick"]
+        n = self.width
         a, b, c, gx, gy = (state[k] for k in ("a", "b", "c", "gx", "gy"))
         multiplies = less(0, tick) & less(tick, n + 2)
         at = {k: equal(tick, n + k) for k in range(2, 10)}
@@ -344,8 +344,7 @@ class ExactConic:
         self._set(after, at[3], "bend", (_size(a) + _size(c)) & bend_bits)
 
         cw, still_x, still_y = (state[k] for k in ("clockwise", "still_x", "still_y"))
-        below_x = where(cw, less(gy, 0), less(0, gy))
-        below_y = where(cw, less(0, gx), less(gx, 0))
+        below_x, below_y = less(gy, 0) ^ negate(cw), less(gx, 0) ^ cw
         down_x = where(still_x, negate(below_y) ^ cw, below_x)
         down_y = where(still_y, below_x ^ cw, below_y)
         # The axes in turn speed up and slow down; of two that are as fast as each other the one
