@@ -5,7 +5,6 @@ Z3 bit-vectors. Needs the ``prove`` extra.
 """
 
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -18,6 +17,7 @@ from amaranth.back import rtlil
 
 from discreta.hdl.contract import Part
 from discreta.hdl.plain import PlainPorts
+from discreta.sim.yosys import yosys
 
 __all__ = [
     "Exhaustive",
@@ -261,8 +261,8 @@ def _register_bits(text: str) -> Iterator[int]:
 
 
 def _smt2(rtlil_text: str) -> str:
-    """Write a design in RTLIL as SMT-LIB; in a process of its own, since Yosys talks on stdout."""
-    commands = [
+    """Write a design in RTLIL as SMT-LIB."""
+    command = yosys(
         "read_rtlil design.il",
         "proc -norom",  # a table stays logic: the initial values of a memory would be lost
         "flatten",
@@ -270,17 +270,10 @@ def _smt2(rtlil_text: str) -> str:
         "async2sync",
         "dffunmap",
         "write_smt2 -bv design.smt2",
-    ]
-    script = "import sys; from pyosys import libyosys as ys; d = ys.Design()\n"
-    script += "for command in sys.argv[1:]: ys.run_pass(command, d)"
+    )
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "design.il").write_text(rtlil_text)
-        subprocess.run(
-            [sys.executable, "-c", script, *commands],
-            cwd=folder,
-            check=True,
-            capture_output=True,
-        )
+        subprocess.run(command, cwd=folder, check=True, capture_output=True)
         return Path(folder, "design.smt2").read_text()
 
 

