@@ -8,13 +8,13 @@ The same source runs on integers, NumPy arrays and SMT bit-vectors (see
 :mod:`discreta.sim.golden.logic`). It knows nothing of the RTL. State and inputs are dicts by
 register and port name.
 
-Registers: of the block that runs ``residual``, ``axial``, ``across`` (its residual and what moves
-it), ``alpha``, ``beta``, ``gamma`` (A, B and C as seen along the path), ``to_residual``,
-``to_axial``, ``to_across`` (constants of the change to come), ``steep``, ``slows``, ``diagonal``,
-``turning``, ``turns``, P1 to P4, XT, YT; ``running``, ``done``, ``error``, ``late`` of УУ;
-``pulse_x/y`` and ``direction_x/y`` of the step that waits. Of the block that is prepared ``a`` to
-``e``, ``gx``, ``gy``, ``bend``, ``clockwise``, those that begin with ``next_``, ``still_x/y``,
-``leads_x``, ``tie``, ``held``, ``fault``, ``tick``.
+Registers: of the block that runs ``residual``, ``outer`` (the residual, and what it would be in the
+next frame), ``axial``, ``across`` (what moves them), ``alpha``, ``beta``, ``gamma`` (A, B and C as
+seen along the path), five constants of the frame, ``steep``, ``slows``, ``diagonal``, ``turning``,
+``turns``, P1 to P4, XT, YT; ``running``, ``done``, ``error``, ``late`` of УУ; ``pulse_x/y`` and
+``direction_x/y`` of the step that waits. Of the block that is prepared ``a`` to ``e``, ``gx``,
+``gy``, ``bend``, ``clockwise``, those that begin with ``next_``, ``still_x/y``, ``leads_x``,
+``tie``, ``held``, ``fault``, ``tick``.
 """
 
 from dataclasses import dataclass
@@ -27,6 +27,10 @@ State = dict[str, Value]
 
 RANGE, OFF_CURVE, SHARP = 1, 2, 3
 TURNS_BITS = 11
+
+#: Of a frame: what a step straight on and aslant adds to ``outer`` beside what it adds to
+#: ``residual``, and what a change adds to the registers.
+CONSTANTS = ("outer_straight", "outer_aslant", "turn_outer", "turn_axial", "turn_across")
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,7 @@ class ExactConic:
     @property
     def last_tick(self) -> int:
         """The last clock of a preparation."""
-        return self.width + 9
+        return self.width + 8
 
     def registers(self) -> dict[str, tuple[int, bool]]:
         """Give the width in bits of every register and whether it is signed."""
@@ -61,12 +65,13 @@ class ExactConic:
             "p3": way,
             "p4": way,
             "residual": (self.residual_bits, True),
+            "outer": (self.residual_bits, True),
             "axial": (self.bits + 1, True),
             "across": (self.bits, True),
             "alpha": square,
             "beta": (n + 5, True),
             "gamma": square,
-            **dict.fromkeys(("to_residual", "to_axial", "to_across"), (n + 7, True)),
+            **dict.fromkeys(CONSTANTS, (n + 8, True)),
             **dict.fromkeys(("steep", "slows", "diagonal", "turning"), flag),
             "turns": (TURNS_BITS, False),
             "xt": point,
@@ -90,6 +95,7 @@ class ExactConic:
             "gy": (self.bits, True),
             "bend": (n + 6, False),
             "next_residual": (self.residual_bits, True),
+            "next_outer": (self.residual_bits, True),
             "clockwise": flag,
             **dict.fromkeys(("still_x", "still_y", "leads_x", "tie"), flag),
             **dict.fromkeys(("next_down_x", "next_down_y", "next_steep", "next_slows"), flag),
@@ -196,7 +202,7 @@ class ExactConic:
         late = where(missed, OFF_CURVE, where(outside, RANGE, 0))
         goes = negate(near | missed | event | outside)
 
-        flip, swap = event & slows, event & negate(slows)
+        flip = event & slows
         for k, p, way in (("x", "p1", "p3"), ("y", "p2", "p4")):
             pulse = where(near, negate(equal(left[k], 0)), goes & steps[k])
             move = where(near, left[k], where(goes & steps[k], where(down[k], -1, 1), 0))
@@ -209,9 +215,6 @@ class ExactConic:
         for name, value in self._summed(state).items():
             self._set(after, clock, name, value)
         ended = clock & (near | missed | outside)
-        self._set(after, clock, "turns", (state["turns"] - flip) & (2**TURNS_BITS - 1))
-        self._set(after, clock, "steep", steep ^ swap)
-        self._set(after, clock, "slows", slows ^ event)
         return {
             "ended": ended,
             "stepless": clock & near & here,
@@ -219,47 +222,41 @@ class ExactConic:
         }
 
     def _summed(self, state: State) -> State:
-        """Give what one clock makes of the residual and of what belongs to it.
+        """Give what one clock makes of the residuals and of what belongs to them.
 
         What it makes of them in the clock that ends the block does not matter.
         """
-        residual, axial, across = state["residual"], state["axial"], state["across"]
+        residual, outer = state["residual"], state["outer"]
+        axial, across, half = state["axial"], state["across"], state["axial"] >> 1
         alpha, beta, gamma = state["alpha"], state["beta"], state["gamma"]
         slows, diagonal, event = state["slows"], state["diagonal"], state["turning"]
 
-        # A step: the residuals of the middles ahead of it, from row to row.
-        straight = self._residual(residual + axial)
-        aslant = self._residual(straight + 2 * across)
-        beyond = where(slows, 0 - 2 * across, 4 * across) + 4 * gamma
-        beyond = self._residual(straight + beyond)
+        increment = axial + where(diagonal, 2 * across, 0)
+        extra = where(diagonal, state["outer_aslant"], state["outer_straight"])
         stepped = {
-            "residual": where(diagonal, aslant, straight),
+            "residual": residual + increment,
+            "outer": outer + increment + extra,
             "axial": axial + 4 * alpha + where(diagonal, 2 * beta, 0),
             "across": across + beta + where(diagonal, 2 * gamma, 0),
             "alpha": alpha,
             "beta": beta,
             "gamma": gamma,
         }
-        # The curve passes beside both points that the step after this one can lead to.
-        outer = where(slows ^ diagonal, beyond, where(slows, straight, aslant))
-        leaves = negate(less(outer, 0)) & negate(slows & equal(state["turns"], 0))
-
-        # A change of the direction, or of the axis that is faster.
-        to_residual, to_axial, to_across = (
-            state[f"to_{name}"] for name in ("residual", "axial", "across")
-        )
+        # The slower axis turns round, or becomes the faster one.
         flipped = {
-            "residual": residual - 2 * across + to_residual,
-            "axial": axial + to_axial,
-            "across": to_across - across,
+            "residual": outer,
+            "outer": outer - half - across + state["turn_outer"],
+            "axial": axial + state["turn_axial"],
+            "across": state["turn_across"] - across,
             "alpha": alpha,
             "beta": 0 - beta,
             "gamma": gamma,
         }
         swapped = {
-            "residual": residual + across - (axial >> 1) + to_residual,
-            "axial": 2 * across + to_axial,
-            "across": (axial >> 1) + to_across,
+            "residual": outer,
+            "outer": outer - axial + state["turn_outer"],
+            "axial": 2 * across + state["turn_axial"],
+            "across": half + state["turn_across"],
             "alpha": gamma,
             "beta": beta,
             "gamma": alpha,
@@ -271,20 +268,41 @@ class ExactConic:
             )
             for name, value in stepped.items()
         }
-        after["turning"] = where(event, 0, leaves)
-        after["diagonal"] = negate(less(after["residual"], 0) ^ slows ^ event)
-        half = {name: state[name] >> 1 for name in ("alpha", "beta", "gamma")}
-        constants = {
-            "to_residual": (
-                2 * beta + 4 * gamma,
-                alpha - 2 * beta + half["alpha"] + half["beta"] - half["gamma"],
-            ),
-            "to_axial": (0 - 2 * beta, 2 * gamma - 3 * beta),
-            "to_across": (4 * gamma, 2 * beta - alpha - half["beta"]),
-        }
-        for name, values in constants.items():
-            after[name] = self._signed(where(slows, *values), kinds[name][0])
+        turns = (state["turns"] - (event & slows)) & (2**TURNS_BITS - 1)
+        after |= {"turns": turns, "steep": state["steep"] ^ (event & negate(slows))}
+        after["slows"] = slows ^ event
+        after |= self._signs(after)
+        for name, value in self._constants(after).items():
+            after[name] = where(event, value, state[name])
         return after
+
+    def _signs(self, frame: State) -> State:
+        """Give what the signs of the residuals mean: for the next step, and for the frame."""
+        stays = frame["slows"] & equal(frame["turns"], 0)
+        return {
+            "diagonal": negate(less(frame["residual"], 0) ^ frame["slows"]),
+            "turning": negate(less(frame["outer"], 0)) & negate(stays),
+        }
+
+    def _constants(self, frame: State) -> State:
+        """Give the constants of a frame."""
+        alpha, beta, gamma = frame["alpha"], frame["beta"], frame["gamma"]
+        alpha_half, beta_half, gamma_half = alpha >> 1, beta >> 1, gamma >> 1
+        pairs = {
+            "outer_straight": (0 - 2 * beta, beta - 2 * alpha),
+            "outer_aslant": (0 - 2 * beta - 4 * gamma, 2 * gamma - 2 * alpha),
+            "turn_outer": (
+                alpha + 2 * beta + 4 * gamma + alpha_half + beta_half - gamma_half,
+                6 * alpha - beta,
+            ),
+            "turn_axial": (0 - 2 * beta, 2 * gamma - 3 * beta),
+            "turn_across": (4 * gamma, 2 * beta - alpha - beta_half),
+        }
+        kinds = self.registers()
+        return {
+            name: self._signed(where(frame["slows"], *pair), kinds[name][0])
+            for name, pair in pairs.items()
+        }
 
     def _load(self, state: State, after: State, load: Value) -> None:
         """Take the prepared block over."""
@@ -296,6 +314,7 @@ class ExactConic:
             "p3": state["next_p3"],
             "p4": state["next_p4"],
             "residual": state["next_residual"],
+            "outer": state["next_outer"],
             "axial": state["gx"],
             "across": state["gy"],
             "alpha": state["a"],
@@ -303,96 +322,81 @@ class ExactConic:
             "gamma": state["c"],
             "steep": state["next_steep"],
             "slows": state["next_slows"],
-            "diagonal": negate(less(state["next_residual"], 0) ^ state["next_slows"]),
-            "turning": 0,
             "turns": state["next_turns"],
             "direction_x": state["next_down_x"],
             "direction_y": state["next_down_y"],
         }
+        loaded |= self._signs(loaded) | self._constants(loaded)
         for name, value in loaded.items():
             self._set(after, load, name, value)
 
     def _prepare(self, state: State, after: State, tick: Value, empty: Value) -> None:
-        """Horner's rule, bit by bit; then the frame of the first piece and the first residual."""
+        """Horner's rule, bit by bit; then the frame of the first piece and the residuals in it."""
         n = self.width
         a, b, c, gx, gy = (state[k] for k in ("a", "b", "c", "gx", "gy"))
+        kinds = self.registers()
         multiplies = less(0, tick) & less(tick, n + 2)
-        at = {k: equal(tick, n + k) for k in range(2, 10)}
-        bits = self.bits
+        at = {k: equal(tick, n + k) for k in range(2, 9)}
+
+        def put(k: int, **values: Value) -> None:
+            for name, value in values.items():
+                bits, signed = kinds[name]
+                kept = self._signed(value, bits) if signed else value & (2**bits - 1)
+                self._set(after, at[k], name, kept)
 
         x_bit, y_bit = ((state[p] >> n) & 1 for p in ("next_x", "next_y"))
-        widths = {"gx": bits + 1, "gy": bits, "next_residual": self.residual_bits}
         for g, x_scale, y_scale in (("gx", 2 * a, b), ("gy", b, 2 * c)):
             digit = where(x_bit, x_scale, 0) + where(y_bit, y_scale, 0)
             grown = 2 * state[g] + where(equal(tick, 1), 0 - digit, digit)
-            self._set(after, multiplies, g, self._signed(grown, widths[g]))
+            self._set(after, multiplies, g, self._signed(grown, kinds[g][0]))
         for p in ("next_x", "next_y"):
             turned = self._signed(2 * state[p] + ((state[p] >> n) & 1), n + 1)
             self._set(after, multiplies, p, turned)
-
-        for g, rest in (("gx", "d"), ("gy", "e")):
-            self._set(after, at[2], g, self._signed(state[g] + state[rest], widths[g]))
-        for way, p in (("next_p3", "next_x"), ("next_p4", "next_y")):
-            self._set(after, at[2], way, self._signed(state[way] - state[p], n + 2))
+        put(2, gx=gx + state["d"], gy=gy + state["e"])
+        put(2, next_p3=state["next_p3"] - state["next_x"])
+        put(2, next_p4=state["next_p4"] - state["next_y"])
 
         rising, falling = gx + gy, gx - gy
-        bend_bits = 2 ** (n + 6) - 1
-        self._set(after, at[3], "still_x", equal(gy, 0))
-        self._set(after, at[3], "still_y", equal(gx, 0))
-        self._set(after, at[3], "leads_x", less(rising, 0) ^ less(falling, 0))
-        self._set(after, at[3], "tie", equal(rising, 0) | equal(falling, 0))
-        self._set(after, at[3], "bend", (_size(a) + _size(c)) & bend_bits)
+        put(3, still_x=equal(gy, 0), still_y=equal(gx, 0))
+        put(3, leads_x=less(rising, 0) ^ less(falling, 0))
+        put(3, tie=equal(rising, 0) | equal(falling, 0), bend=_size(a) + _size(c))
 
         cw, still_x, still_y = (state[k] for k in ("clockwise", "still_x", "still_y"))
         below_x, below_y = less(gy, 0) ^ negate(cw), less(gx, 0) ^ cw
+        # An axis that stands still goes where the curve bends to.
         down_x = where(still_x, negate(below_y) ^ cw, below_x)
         down_y = where(still_y, below_x ^ cw, below_y)
         # The axes in turn speed up and slow down; of two that are as fast as each other the one
         # leads that does not slow down.
         x_slows = negate(down_x ^ down_y ^ cw)
         leads_x = where(state["tie"], negate(x_slows), state["leads_x"])
-        self._set(after, at[4], "next_down_x", down_x)
-        self._set(after, at[4], "next_down_y", down_y)
-        self._set(after, at[4], "next_steep", negate(leads_x))
-        self._set(after, at[4], "next_slows", x_slows ^ leads_x)
-        self._set(after, at[4], "bend", (state["bend"] + _size(b)) & bend_bits)
+        put(4, next_down_x=down_x, next_down_y=down_y, next_steep=negate(leads_x))
+        put(4, next_slows=x_slows ^ leads_x, bend=state["bend"] + _size(b))
 
         steep, slows = state["next_steep"], state["next_slows"]
         ahead_x = where(state["next_down_x"], 0 - gx, gx)
         ahead_y = where(state["next_down_y"], 0 - gy, gy)
         opposed = state["next_down_x"] ^ state["next_down_y"]
-        seen = {
-            "gx": self._signed(where(steep, ahead_y, ahead_x), bits + 1),
-            "gy": self._signed(where(steep, ahead_x, ahead_y), bits),
-            "a": where(steep, c, a),
-            "b": self._signed(where(opposed, 0 - b, b), n + 5),
-            "c": where(steep, a, c),
-        }
-        for name, value in seen.items():
-            self._set(after, at[5], name, value)
+        put(5, gx=where(steep, ahead_y, ahead_x), gy=where(steep, ahead_x, ahead_y))
+        put(5, a=where(steep, c, a), b=where(opposed, 0 - b, b), c=where(steep, a, c))
 
-        size = where(slows, gy - gx, gx - gy)
-        sharp = less(size, 4 * state["bend"]) | (still_x & still_y)
-        self._set(after, at[6] & negate(empty) & sharp, "fault", SHARP)
-        total = state["next_residual"]
-        sums = {
-            "gx": {6: 2 * gx + 4 * a, 7: gx + 2 * a, 8: gx + b},
-            "gy": {6: gy + 2 * b, 7: gy + 2 * c},
-            "next_residual": {6: 2 * gx + gy, 7: total + 2 * a, 8: total + b, 9: total + (c >> 1)},
-        }
-        for name, values in sums.items():
-            for k, value in values.items():
-                self._set(after, at[k], name, self._signed(value, widths[name]))
+        # D and E have been added: their registers hold what else there is to add.
+        put(6, next_residual=where(slows, gy - gx, gx - gy))
+        put(6, d=6 * a + b, e=2 * b + 2 * c)
+        sharp = less(state["next_residual"], 4 * state["bend"]) | (still_x & still_y)
+        self._set(after, at[7] & negate(empty) & sharp, "fault", SHARP)
+        put(7, gx=2 * gx + state["d"], gy=gy + state["e"], next_residual=2 * gx + gy)
+        put(7, next_outer=where(slows, 2 * gx - gy, 2 * gy + gx))
+        put(7, d=2 * a + b + (c >> 1))
+        put(7, e=where(slows, 2 * a - b + (c >> 1), 2 * c + b + (a >> 1)))
+        put(8, next_residual=state["next_residual"] + state["d"])
+        put(8, next_outer=state["next_outer"] + state["e"])
         counted = (tick + 1) & (2 ** self.last_tick.bit_length() - 1)
-        after["tick"] = where(at[9] | equal(tick, 0), 0, counted)
+        after["tick"] = where(at[8] | equal(tick, 0), 0, counted)
 
     def _set(self, after: State, condition: Value, name: str, value: Value) -> None:
         """Let a register have a value where the condition holds."""
         after[name] = where(condition, value, after[name])
-
-    def _residual(self, value: Value) -> Value:
-        """Keep a residual to its bits."""
-        return self._signed(value, self.residual_bits)
 
     def _signed(self, value: Value, bits: int) -> Value:
         """Keep a number to its signed bits."""
