@@ -141,20 +141,23 @@ class ExactConic(Part):
         self.parameters: dict[str, object] = {"width": width}
         point, way, square = signed(n + 1), signed(n + 2), signed(coefficient_bits(n))
         bits, linear = derivative_bits(n), signed(linear_bits(n))
-        constant, factor = signed(n + 7), signed(n + 5)
+        constant, factor = signed(n + 8), signed(n + 5)
         self.uu = ControlUnit()
         self.output = QuadrantOutput(2)
         self.p1, self.p2 = Signal(point, name="p1"), Signal(point, name="p2")
         self.p3, self.p4 = Signal(way, name="p3"), Signal(way, name="p4")
         self.residual = Signal(signed(bits + 2))
+        self.outer = Signal(signed(bits + 2))
         self.axial = Signal(signed(bits + 1))
         self.across = Signal(signed(bits))
         self.alpha = Signal(square)
         self.beta = Signal(factor)
         self.gamma = Signal(square)
-        self.to_residual = Signal(constant)
-        self.to_axial = Signal(constant)
-        self.to_across = Signal(constant)
+        self.outer_straight = Signal(constant)
+        self.outer_aslant = Signal(constant)
+        self.turn_outer = Signal(constant)
+        self.turn_axial = Signal(constant)
+        self.turn_across = Signal(constant)
         self.steep = Signal()
         self.slows = Signal()
         self.diagonal = Signal()
@@ -165,7 +168,7 @@ class ExactConic(Part):
 
         self.held = Signal()
         self.fault = Signal(ErrorCode)
-        self.tick = Signal(range(n + 10))
+        self.tick = Signal(range(n + 9))
         self.a = Signal(square)
         self.b = Signal(factor)
         self.c = Signal(square)
@@ -175,6 +178,7 @@ class ExactConic(Part):
         self.gy = Signal(signed(bits))
         self.bend = Signal(n + 6)
         self.next_residual = Signal(signed(bits + 2))
+        self.next_outer = Signal(signed(bits + 2))
         self.clockwise = Signal()
         self.still_x = Signal()
         self.still_y = Signal()
@@ -194,9 +198,12 @@ class ExactConic(Part):
         groups = {
             "P1, P2 coordinates": [self.p1, self.p2],
             "P3, P4 way to the end": [self.p3, self.p4],
-            "residual": [self.residual, self.axial, self.across],
-            "coefficients of the frame": [self.alpha, self.beta, self.gamma],
-            "change to come": [self.to_residual, self.to_axial, self.to_across],
+            "residuals": [self.residual, self.outer, self.axial, self.across],
+            "coefficients": [self.alpha, self.beta, self.gamma],
+            "constants of the frame": [
+                *(self.outer_straight, self.outer_aslant),
+                *(self.turn_outer, self.turn_axial, self.turn_across),
+            ],
             "frame": [self.steep, self.slows, self.diagonal, self.turning, self.turns],
             "XT, YT position": [self.xt.register, self.yt.register],
             "УУ": [uu.running, uu.done_register, uu.error_register, self.late],
@@ -204,7 +211,7 @@ class ExactConic(Part):
             "prepared block": [
                 *(self.held, self.fault, self.tick),
                 *(self.a, self.b, self.c, self.d, self.e, self.gx, self.gy, self.bend),
-                *(self.next_residual, self.clockwise),
+                *(self.next_residual, self.next_outer, self.clockwise),
                 *(self.still_x, self.still_y, self.leads_x, self.tie),
                 *(self.next_down_x, self.next_down_y, self.next_steep, self.next_slows),
                 *(self.next_turns, self.next_x, self.next_y, self.next_p3, self.next_p4),
@@ -216,6 +223,15 @@ class ExactConic(Part):
         self.registers: dict[str, Signal] = {
             register.name: register for group in self.diagram.values() for register in group
         }
+        summed = (self.residual, self.outer, self.axial, self.across)
+        summed += (self.alpha, self.beta, self.gamma)
+        self.between: dict[str, Signal] = {
+            "increment": Signal(signed(bits + 2)),
+            "opposite": Signal(signed(bits + 2)),
+            **{f"{it.name}_after": Signal.like(it, name=f"{it.name}_after") for it in summed},
+            **{f"more_{name}": Signal(constant) for name in ("alpha", "beta", "gamma")},
+        }
+        self.intermediates = self.between
         #: What a clock does: it takes over a block, makes a step, ends the block.
         self.accept = Signal()
         self.goes = Signal()
@@ -253,7 +269,6 @@ class ExactConic(Part):
             m.d.sync += self.held.eq(0)
         self._move(m)
         self._sum(m)
-        self._load(m)
         self._prepare(m, empty)
         return m
 
@@ -294,7 +309,10 @@ class ExactConic(Part):
                 position.down.eq(out.down[k]),
                 self.position[k].eq(position.register),
             ]
-            with m.If(uu.clock):
+            with m.If(uu.load):
+                first = (self.next_x, self.next_p3) if k == "x" else (self.next_y, self.next_p4)
+                m.d.sync += [place.eq(first[0]), left.eq(first[1])]
+            with m.Elif(uu.clock):
                 m.d.sync += [place.eq(place + move), left.eq(left - move)]
         m.d.comb += [
             self.near.eq((self.turns < 2) & close[0] & close[1]),
@@ -311,105 +329,106 @@ class ExactConic(Part):
         ]
         m.d.sync += self.late.eq(ErrorCode.NONE)
         with m.If(uu.clock):
-            m.d.sync += [
-                self.turns.eq(self.turns - flip),
-                self.steep.eq(steep ^ (self.turning & ~self.slows)),
-                self.slows.eq(self.slows ^ self.turning),
-            ]
             with m.If(self.missed):
                 m.d.sync += self.late.eq(ErrorCode.OFF_CURVE)
             with m.Elif(self.outside):
                 m.d.sync += self.late.eq(ErrorCode.RANGE)
 
     def _sum(self, m: Module) -> None:
-        """Add up the residual and what belongs to it, for a step or for a change of the frame."""
-        residual, axial, across = self.residual, self.axial, self.across
+        """Add up the residuals and what belongs to them, for a step or for a change of the frame."""
+        residual, outer, axial, across = self.residual, self.outer, self.axial, self.across
         alpha, beta, gamma = self.alpha, self.beta, self.gamma
-        slows, diagonal = self.slows, self.diagonal
-        straight, aslant, beyond, changed = (
-            Signal(residual.shape(), name=name)
-            for name in ("straight", "aslant", "beyond", "changed")
-        )
-        outer = Signal()
-        m.d.comb += [
-            straight.eq(residual + axial),
-            aslant.eq(residual + axial + (across << 1)),
-            beyond.eq(
-                residual + axial + Mux(slows, -(across << 1), across << 2) + (gamma << 2)
-            ),
-            changed.eq(
-                residual
-                + Mux(slows, -(across << 1), across - (axial >> 1))
-                + self.to_residual
-            ),
-            outer.eq(
-                Mux(slows ^ diagonal, beyond[-1], Mux(slows, straight[-1], aslant[-1]))
-            ),
-        ]
-        after = Signal(residual.shape())
-        m.d.comb += after.eq(Mux(self.turning, changed, Mux(diagonal, aslant, straight)))
-        with m.If(self.uu.clock):
-            m.d.sync += [
-                residual.eq(after),
-                self.diagonal.eq(~(after[-1] ^ slows ^ self.turning)),
-                self.to_residual.eq(
-                    Mux(
-                        slows,
-                        (beta << 1) + (gamma << 2),
-                        alpha - (beta << 1) + (alpha >> 1) + (beta >> 1) - (gamma >> 1),
-                    )
-                ),
-                self.to_axial.eq(Mux(slows, -(beta << 1), (gamma << 1) - beta - (beta << 1))),
-                self.to_across.eq(Mux(slows, gamma << 2, (beta << 1) - alpha - (beta >> 1))),
-            ]
-            with m.If(~self.turning):
-                m.d.sync += [
-                    axial.eq(axial + (alpha << 2) + Mux(diagonal, beta << 1, 0)),
-                    across.eq(across + beta + Mux(diagonal, gamma << 1, 0)),
-                    self.turning.eq(~outer & ~(slows & (self.turns == 0))),
-                ]
-            with m.Elif(slows):
-                m.d.sync += [
-                    axial.eq(axial + self.to_axial),
-                    across.eq(self.to_across - across),
-                    beta.eq(-beta),
-                    self.turning.eq(0),
-                ]
-            with m.Else():
-                m.d.sync += [
-                    axial.eq((across << 1) + self.to_axial),
-                    across.eq((axial >> 1) + self.to_across),
-                    alpha.eq(gamma),
-                    gamma.eq(alpha),
-                    self.turning.eq(0),
-                ]
+        slows, diagonal, turning = self.slows, self.diagonal, self.turning
+        load, half = self.uu.load, axial >> 1
 
-    def _load(self, m: Module) -> None:
-        """Take the prepared block over."""
-        with m.If(self.uu.load):
+        increment, opposite = self.between["increment"], self.between["opposite"]
+        m.d.comb += [
+            increment.eq(axial + Mux(diagonal, across << 1, 0)),
+            opposite.eq(self.turn_outer - (Mux(slows, half, axial) + Mux(slows, across, 0))),
+        ]
+        extra = Mux(diagonal, self.outer_aslant, self.outer_straight)
+        # What a block loads, a change of the frame makes, a step makes.
+        sums = (
+            (residual, self.next_residual, outer, residual + increment),
+            (
+                outer,
+                self.next_outer,
+                outer + opposite,
+                outer + increment + extra,
+            ),
+            (
+                axial,
+                self.gx,
+                Mux(slows, axial, across << 1) + self.turn_axial,
+                axial + (alpha << 2) + Mux(diagonal, beta << 1, 0),
+            ),
+            (
+                across,
+                self.gy,
+                Mux(slows, -across, half) + self.turn_across,
+                across + beta + Mux(diagonal, gamma << 1, 0),
+            ),
+        )
+        after = []
+        for register, loaded, changed, stepped in sums:
+            value = self.between[f"{register.name}_after"]
+            m.d.comb += value.eq(Mux(load, loaded, Mux(turning, changed, stepped)))
+            after.append(value)
+            with m.If(load | self.uu.clock):
+                m.d.sync += register.eq(value)
+
+        # The frame of the next clock, and what goes with it.
+        flip, swap = turning & slows, turning & ~slows
+        frame = (
+            (alpha, Mux(load, self.a, Mux(swap, gamma, alpha))),
+            (beta, Mux(load, self.b, Mux(flip, -beta, beta))),
+            (gamma, Mux(load, self.c, Mux(swap, alpha, gamma))),
+            (self.slows, Mux(load, self.next_slows, slows ^ turning)),
+            (self.steep, Mux(load, self.next_steep, self.steep ^ swap)),
+            (self.turns, Mux(load, self.next_turns, self.turns - flip)),
+        )
+        new = [
+            self.between.get(f"{register.name}_after", Signal.like(register)) for register, _ in frame
+        ]
+        m.d.comb += [signal.eq(value) for signal, (_, value) in zip(new, frame, strict=True)]
+        new_alpha, new_beta, new_gamma, new_slows, _, new_turns = new
+        stays = new_slows & (new_turns == 0)
+        with m.If(load | self.uu.clock):
             m.d.sync += [
-                self.p1.eq(self.next_x),
-                self.p2.eq(self.next_y),
-                self.p3.eq(self.next_p3),
-                self.p4.eq(self.next_p4),
-                self.residual.eq(self.next_residual),
-                self.axial.eq(self.gx),
-                self.across.eq(self.gy),
-                self.alpha.eq(self.a),
-                self.beta.eq(self.b),
-                self.gamma.eq(self.c),
-                self.steep.eq(self.next_steep),
-                self.slows.eq(self.next_slows),
-                self.diagonal.eq(~(self.next_residual[-1] ^ self.next_slows)),
-                self.turning.eq(0),
-                self.turns.eq(self.next_turns),
+                *[register.eq(value) for value, (register, _) in zip(new, frame, strict=True)],
+                diagonal.eq(~(after[0][-1] ^ new_slows)),
+                turning.eq(~after[1][-1] & ~stays),
+            ]
+        more = self.between
+        m.d.comb += [
+            more["more_alpha"].eq(new_alpha + (new_alpha >> 1)),
+            more["more_beta"].eq((new_beta << 1) + (new_beta >> 1)),
+            more["more_gamma"].eq((new_gamma << 2) - (new_gamma >> 1)),
+        ]
+        beta_2, gamma_4 = new_beta << 1, new_gamma << 2
+        alpha_2, gamma_2 = new_alpha << 1, new_gamma << 1
+        pairs = (
+            (self.outer_straight, -beta_2, new_beta - alpha_2),
+            (self.outer_aslant, -beta_2 - gamma_4, gamma_2 - alpha_2),
+            (
+                self.turn_outer,
+                more["more_alpha"] + more["more_beta"] + more["more_gamma"],
+                (new_alpha << 2) + alpha_2 - new_beta,
+            ),
+            (self.turn_axial, -beta_2, gamma_2 - new_beta - beta_2),
+            (self.turn_across, gamma_4, beta_2 - new_alpha - (new_beta >> 1)),
+        )
+        with m.If(load | (self.uu.clock & turning)):
+            m.d.sync += [
+                register.eq(Mux(new_slows, slow, fast)) for register, slow, fast in pairs
             ]
 
     def _prepare(self, m: Module, empty: Signal) -> None:
         """Multiply the start by the coefficients, bit by bit, and find the frame it begins in."""
         n, tick, block = self.width, self.tick, self.blocks.payload
-        a, b, c, gx, gy = self.a, self.b, self.c, self.gx, self.gy
-        total, cw = self.next_residual, self.clockwise
+        a, b, c, d, e, gx, gy = self.a, self.b, self.c, self.d, self.e, self.gx, self.gy
+        total, outer, cw = self.next_residual, self.next_outer, self.clockwise
+        steep, slows = self.next_steep, self.next_slows
         with m.If(self.accept):
             m.d.sync += [
                 *[getattr(self, k).eq(block[k]) for k in "abcde"],
@@ -425,22 +444,24 @@ class ExactConic(Part):
                 tick.eq(1),
             ]
         with m.Else():
-            with m.If(tick == n + 9):
+            with m.If(tick == n + 8):
                 m.d.sync += tick.eq(0)
             with m.Elif(tick != 0):
                 m.d.sync += tick.eq(tick + 1)
-            with m.If((tick != 0) & (tick < n + 2)):
+            multiplies = Signal()
+            m.d.comb += multiplies.eq((tick != 0) & (tick < n + 2))
+            with m.If(multiplies):
                 m.d.sync += [p.eq(p.rotate_left(1)) for p in (self.next_x, self.next_y)]
                 for g, x_scale, y_scale in ((gx, a << 1, b), (gy, b, c << 1)):
                     digit = Mux(self.next_x[n], x_scale, 0) + Mux(self.next_y[n], y_scale, 0)
                     m.d.sync += g.eq((g << 1) + Mux(tick == 1, -digit, digit))
             with m.If(tick == n + 2):
                 m.d.sync += [
-                    gx.eq(gx + self.d),
-                    gy.eq(gy + self.e),
                     self.next_p3.eq(self.next_p3 - self.next_x),
                     self.next_p4.eq(self.next_p4 - self.next_y),
                 ]
+            with m.If((tick == n + 2) | (tick == n + 7)):
+                m.d.sync += [gx.eq(Mux(tick == n + 2, gx, gx << 1) + d), gy.eq(gy + e)]
             with m.If(tick == n + 3):
                 rising, falling = gx + gy, gx - gy
                 m.d.sync += [
@@ -453,37 +474,34 @@ class ExactConic(Part):
             with m.If(tick == n + 4):
                 self._frame(m)
                 m.d.sync += self.bend.eq(self.bend + abs(b))
-            steep, slows = self.next_steep, self.next_slows
             with m.If(tick == n + 5):
-                ahead_x = Mux(self.next_down_x, -gx, gx)
-                ahead_y = Mux(self.next_down_y, -gy, gy)
+                down_x, down_y = self.next_down_x, self.next_down_y
                 m.d.sync += [
-                    gx.eq(Mux(steep, ahead_y, ahead_x)),
-                    gy.eq(Mux(steep, ahead_x, ahead_y)),
+                    gx.eq(_opposed(Mux(steep, down_y, down_x), Mux(steep, gy, gx))),
+                    gy.eq(_opposed(Mux(steep, down_x, down_y), Mux(steep, gx, gy))),
                     a.eq(Mux(steep, c, a)),
-                    b.eq(Mux(self.next_down_x ^ self.next_down_y, -b, b)),
+                    b.eq(_opposed(down_x ^ down_y, b)),
                     c.eq(Mux(steep, a, c)),
                 ]
+            # D and E have been added: their registers hold what else there is to add.
             with m.If(tick == n + 6):
-                size = Mux(slows, gy - gx, gx - gy)
-                sharp = (size < (self.bend << 2)) | (self.still_x & self.still_y)
+                m.d.sync += [
+                    total.eq(Mux(slows, gy - gx, gx - gy)),
+                    d.eq((a << 2) + (a << 1) + b),
+                    e.eq((b + c) << 1),
+                ]
+            with m.If(tick == n + 7):
+                sharp = (total < (self.bend << 2)) | (self.still_x & self.still_y)
                 with m.If(~empty & sharp):
                     m.d.sync += self.fault.eq(ErrorCode.SHARP)
                 m.d.sync += [
-                    gx.eq((gx << 1) + (a << 2)),
-                    gy.eq(gy + (b << 1)),
                     total.eq((gx << 1) + gy),
-                ]
-            with m.If(tick == n + 7):
-                m.d.sync += [
-                    gx.eq(gx + (a << 1)),
-                    gy.eq(gy + (c << 1)),
-                    total.eq(total + (a << 1)),
+                    outer.eq(Mux(slows, (gx << 1) - gy, (gy << 1) + gx)),
+                    d.eq((a << 1) + b + (c >> 1)),
+                    e.eq(Mux(slows, (a << 1) - b + (c >> 1), (c << 1) + b + (a >> 1))),
                 ]
             with m.If(tick == n + 8):
-                m.d.sync += [gx.eq(gx + b), total.eq(total + b)]
-            with m.If(tick == n + 9):
-                m.d.sync += total.eq(total + (c >> 1))
+                m.d.sync += [total.eq(total + d), outer.eq(outer + e)]
 
     def _frame(self, m: Module) -> None:
         """Tell the directions at the start, the axis that leads, and whether the other one slows.
@@ -506,3 +524,8 @@ class ExactConic(Part):
             self.next_steep.eq(~leads_x),
             self.next_slows.eq(x_slows ^ leads_x),
         ]
+
+
+def _opposed(opposed: Value, value: Value) -> Value:
+    """Give a value or, where a condition holds, its opposite: by one adder."""
+    return (value ^ opposed.replicate(len(value))).as_signed() + opposed

@@ -17,6 +17,7 @@ seen along the path), five constants of the frame, ``steep``, ``slows``, ``diago
 ``tie``, ``held``, ``fault``, ``tick``.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from discreta.sim.golden.logic import Value, equal, less, negate, where
@@ -31,6 +32,11 @@ TURNS_BITS = 11
 #: Of a frame: what a step straight on and aslant adds to ``outer`` beside what it adds to
 #: ``residual``, and what a change adds to the registers.
 CONSTANTS = ("outer_straight", "outer_aslant", "turn_outer", "turn_axial", "turn_across")
+
+
+def _keep(_name: str, value: Value) -> Value:
+    """Reckon with a value itself."""
+    return value
 
 
 @dataclass(frozen=True)
@@ -127,11 +133,15 @@ class ExactConic:
             out[f"steps_{k}"] = where(state[f"pulse_{k}"], where(state[f"direction_{k}"], -1, 1), 0)
         return out
 
-    def step(self, state: State, inputs: dict[str, Value]) -> State:
+    def step(
+        self, state: State, inputs: dict[str, Value], tell: Callable[[str, Value], Value] = _keep
+    ) -> State:
         """Give the state after one clock.
 
         ``inputs``: ``blocks_valid``, ``blocks_a`` … ``blocks_e``, ``blocks_start_x/y``,
-        ``blocks_end_x/y``, ``blocks_clockwise``, ``blocks_turns``, ``steps_ready``.
+        ``blocks_end_x/y``, ``blocks_clockwise``, ``blocks_turns``, ``steps_ready``. ``tell`` is
+        told every value between the registers that has a name, and gives what is reckoned with
+        instead.
         """
         outputs = self.outputs(state)
         waiting = outputs["steps_valid"]
@@ -147,7 +157,7 @@ class ExactConic:
         clock = state["running"] & free
 
         after = dict(state)
-        ends = self._run(state, after, clock)
+        ends = self._run(state, after, clock, load, tell)
         # The position moves with the step that is taken, not with the one that waits.
         for k in "xy":
             move = where(state[f"direction_{k}"], -1, 1)
@@ -179,7 +189,9 @@ class ExactConic:
         after["held"] = where(accept, 1, where(start, 0, state["held"]))
         return after
 
-    def _run(self, state: State, after: State, clock: Value) -> dict[str, Value]:
+    def _run(
+        self, state: State, after: State, clock: Value, load: Value, tell: Callable
+    ) -> dict[str, Value]:
         """One clock pulse of УУ, if there is one; give how it ends the block, if it does."""
         n = self.width
         steep, slows, diagonal = state["steep"], state["slows"], state["diagonal"]
@@ -212,8 +224,8 @@ class ExactConic:
             after[f"pulse_{k}"] = pulse
             turned = where(near, less(left[k], 0), down[k] ^ (flip & minor))
             self._set(after, clock, f"direction_{k}", turned)
-        for name, value in self._summed(state).items():
-            self._set(after, clock, name, value)
+        for name, value in self._summed(state, load, tell).items():
+            self._set(after, clock | load, name, value)
         ended = clock & (near | missed | outside)
         return {
             "ended": ended,
@@ -221,59 +233,62 @@ class ExactConic:
             "late": where(clock, late, 0),
         }
 
-    def _summed(self, state: State) -> State:
-        """Give what one clock makes of the residuals and of what belongs to them.
+    def _summed(self, state: State, load: Value, tell: Callable) -> State:
+        """Give what one clock makes of the residuals and of what belongs to them, or a block loads.
 
         What it makes of them in the clock that ends the block does not matter.
         """
-        residual, outer = state["residual"], state["outer"]
-        axial, across, half = state["axial"], state["across"], state["axial"] >> 1
+        outer, axial, across = state["outer"], state["axial"], state["across"]
         alpha, beta, gamma = state["alpha"], state["beta"], state["gamma"]
         slows, diagonal, event = state["slows"], state["diagonal"], state["turning"]
 
-        increment = axial + where(diagonal, 2 * across, 0)
+        increment = tell("increment", axial + where(diagonal, 2 * across, 0))
         extra = where(diagonal, state["outer_aslant"], state["outer_straight"])
         stepped = {
-            "residual": residual + increment,
+            "residual": state["residual"] + increment,
             "outer": outer + increment + extra,
             "axial": axial + 4 * alpha + where(diagonal, 2 * beta, 0),
             "across": across + beta + where(diagonal, 2 * gamma, 0),
-            "alpha": alpha,
-            "beta": beta,
-            "gamma": gamma,
         }
         # The slower axis turns round, or becomes the faster one.
-        flipped = {
+        half = axial >> 1
+        opposite = where(slows, half, axial) + where(slows, across, 0)
+        opposite = tell("opposite", state["turn_outer"] - opposite)
+        changed = {
             "residual": outer,
-            "outer": outer - half - across + state["turn_outer"],
-            "axial": axial + state["turn_axial"],
-            "across": state["turn_across"] - across,
-            "alpha": alpha,
-            "beta": 0 - beta,
-            "gamma": gamma,
+            "outer": outer + opposite,
+            "axial": where(slows, axial, 2 * across) + state["turn_axial"],
+            "across": where(slows, 0 - across, half) + state["turn_across"],
         }
-        swapped = {
-            "residual": outer,
-            "outer": outer - axial + state["turn_outer"],
-            "axial": 2 * across + state["turn_axial"],
-            "across": half + state["turn_across"],
-            "alpha": gamma,
-            "beta": beta,
-            "gamma": alpha,
+        loaded = {
+            "residual": state["next_residual"],
+            "outer": state["next_outer"],
+            "axial": state["gx"],
+            "across": state["gy"],
+        }
+        flip, swap = event & slows, event & negate(slows)
+        after = {
+            name: where(load, loaded[name], where(event, changed[name], value))
+            for name, value in stepped.items()
+        } | {
+            "alpha": where(load, state["a"], where(swap, gamma, alpha)),
+            "beta": where(load, state["b"], where(flip, 0 - beta, beta)),
+            "gamma": where(load, state["c"], where(swap, alpha, gamma)),
         }
         kinds = self.registers()
         after = {
-            name: self._signed(
-                where(event, where(slows, flipped[name], swapped[name]), value), kinds[name][0]
-            )
-            for name, value in stepped.items()
+            name: tell(f"{name}_after", self._signed(value, kinds[name][0]))
+            for name, value in after.items()
         }
-        turns = (state["turns"] - (event & slows)) & (2**TURNS_BITS - 1)
-        after |= {"turns": turns, "steep": state["steep"] ^ (event & negate(slows))}
-        after["slows"] = slows ^ event
+        turns = (state["turns"] - flip) & (2**TURNS_BITS - 1)
+        after |= {
+            "turns": where(load, state["next_turns"], turns),
+            "steep": where(load, state["next_steep"], state["steep"] ^ swap),
+            "slows": where(load, state["next_slows"], slows ^ event),
+        }
         after |= self._signs(after)
-        for name, value in self._constants(after).items():
-            after[name] = where(event, value, state[name])
+        for name, value in self._constants(after, tell).items():
+            after[name] = where(load | event, value, state[name])
         return after
 
     def _signs(self, frame: State) -> State:
@@ -284,19 +299,21 @@ class ExactConic:
             "turning": negate(less(frame["outer"], 0)) & negate(stays),
         }
 
-    def _constants(self, frame: State) -> State:
+    def _constants(self, frame: State, tell: Callable) -> State:
         """Give the constants of a frame."""
         alpha, beta, gamma = frame["alpha"], frame["beta"], frame["gamma"]
-        alpha_half, beta_half, gamma_half = alpha >> 1, beta >> 1, gamma >> 1
+        more_alpha = tell("more_alpha", alpha + (alpha >> 1))
+        more_beta = tell("more_beta", 2 * beta + (beta >> 1))
+        more_gamma = tell("more_gamma", 4 * gamma - (gamma >> 1))
         pairs = {
             "outer_straight": (0 - 2 * beta, beta - 2 * alpha),
             "outer_aslant": (0 - 2 * beta - 4 * gamma, 2 * gamma - 2 * alpha),
             "turn_outer": (
-                alpha + 2 * beta + 4 * gamma + alpha_half + beta_half - gamma_half,
-                6 * alpha - beta,
+                more_alpha + more_beta + more_gamma,
+                4 * alpha + 2 * alpha - beta,
             ),
-            "turn_axial": (0 - 2 * beta, 2 * gamma - 3 * beta),
-            "turn_across": (4 * gamma, 2 * beta - alpha - beta_half),
+            "turn_axial": (0 - 2 * beta, 2 * gamma - beta - 2 * beta),
+            "turn_across": (4 * gamma, 2 * beta - alpha - (beta >> 1)),
         }
         kinds = self.registers()
         return {
@@ -313,20 +330,9 @@ class ExactConic:
             "yt": state["next_y"],
             "p3": state["next_p3"],
             "p4": state["next_p4"],
-            "residual": state["next_residual"],
-            "outer": state["next_outer"],
-            "axial": state["gx"],
-            "across": state["gy"],
-            "alpha": state["a"],
-            "beta": state["b"],
-            "gamma": state["c"],
-            "steep": state["next_steep"],
-            "slows": state["next_slows"],
-            "turns": state["next_turns"],
             "direction_x": state["next_down_x"],
             "direction_y": state["next_down_y"],
         }
-        loaded |= self._signs(loaded) | self._constants(loaded)
         for name, value in loaded.items():
             self._set(after, load, name, value)
 
@@ -382,7 +388,7 @@ class ExactConic:
 
         # D and E have been added: their registers hold what else there is to add.
         put(6, next_residual=where(slows, gy - gx, gx - gy))
-        put(6, d=6 * a + b, e=2 * b + 2 * c)
+        put(6, d=4 * a + 2 * a + b, e=2 * (b + c))
         sharp = less(state["next_residual"], 4 * state["bend"]) | (still_x & still_y)
         self._set(after, at[7] & negate(empty) & sharp, "fault", SHARP)
         put(7, gx=2 * gx + state["d"], gy=gy + state["e"], next_residual=2 * gx + gy)
