@@ -221,7 +221,7 @@ def _defaults(choice: str) -> str:
         said = {
             method.name: say_choices({choice: method.settings[setting][choice]})
             for method in METHODS.values()
-            if choice in method.settings[setting]
+            if choice in method.settings.get(setting, {})
         }
         said = {name: value.removeprefix(f"{choice} ") for name, value in said.items()}
         if len(set(said.values())) == 1:

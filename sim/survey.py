@@ -285,6 +285,21 @@ class _Conics:
         return f"{curve}{' cw' if block[9] else ''}{turns}", say_point(point)
 
 
+class _ExactConics(_Conics):
+    """Curves of the second order whose faster axis steps every clock."""
+
+    watch: tuple[str, ...] = ("running",)
+    cost: int = 1
+
+    def clocks(self, method: Method, golden: Any, group: Group) -> np.ndarray:
+        """Give the most clocks that they can take, and few take fewer."""
+        return method.clocks(golden, group.blocks)
+
+    def completing(self, seen: dict[str, np.ndarray]) -> np.ndarray:
+        """Tell that they have no completing steps."""
+        return np.zeros(len(seen["running"]), dtype=bool)
+
+
 _CURVES: dict[tuple[str, bool], _Curve] = {
     ("line", False): _Lines(),
     ("arc", False): _Arcs(),
@@ -294,8 +309,12 @@ _CURVES: dict[tuple[str, bool], _Curve] = {
 }
 
 
+#: Methods whose registers are not those of the others that draw the same curve.
+_OWN_CURVES: dict[str, _Curve] = {"exact_conic": _ExactConics()}
+
+
 def _curve(method: Method) -> _Curve:
-    return _CURVES[method.curve, method.timed]
+    return _OWN_CURVES.get(method.name) or _CURVES[method.curve, method.timed]
 
 
 def say_worst(method: Method, group: Group, row: SurveyRow) -> tuple[str, str]:
