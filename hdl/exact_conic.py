@@ -162,11 +162,13 @@ class ExactConic(Part):
         self.slows = Signal()
         self.diagonal = Signal()
         self.turning = Signal()
+        self.fresh = Signal()
         self.turns = Signal(TURNS_BITS)
         self.xt, self.yt = PositionRegister(n, name="xt"), PositionRegister(n, name="yt")
         self.late = Signal(ErrorCode)
 
         self.held = Signal()
+        self.prepared = Signal()
         self.fault = Signal(ErrorCode)
         self.tick = Signal(range(n + 9))
         self.a = Signal(square)
@@ -189,6 +191,7 @@ class ExactConic(Part):
         self.next_steep = Signal()
         self.next_slows = Signal()
         self.next_turns = Signal(TURNS_BITS)
+        self.next_empty = Signal()
         self.next_x = Signal(point)
         self.next_y = Signal(point)
         self.next_p3 = Signal(way)
@@ -204,17 +207,20 @@ class ExactConic(Part):
                 *(self.outer_straight, self.outer_aslant),
                 *(self.turn_outer, self.turn_axial, self.turn_across),
             ],
-            "frame": [self.steep, self.slows, self.diagonal, self.turning, self.turns],
+            "frame": [
+                *(self.steep, self.slows, self.diagonal, self.turning, self.fresh, self.turns)
+            ],
             "XT, YT position": [self.xt.register, self.yt.register],
             "УУ": [uu.running, uu.done_register, uu.error_register, self.late],
             "step that waits": [*out.pulse_registers.values(), *out.direction_registers.values()],
             "prepared block": [
-                *(self.held, self.fault, self.tick),
+                *(self.held, self.prepared, self.fault, self.tick),
                 *(self.a, self.b, self.c, self.d, self.e, self.gx, self.gy, self.bend),
                 *(self.next_residual, self.next_outer, self.clockwise),
                 *(self.still_x, self.still_y, self.leads_x, self.tie),
                 *(self.next_down_x, self.next_down_y, self.next_steep, self.next_slows),
-                *(self.next_turns, self.next_x, self.next_y, self.next_p3, self.next_p4),
+                *(self.next_turns, self.next_empty),
+                *(self.next_x, self.next_y, self.next_p3, self.next_p4),
             ],
         }
         self.diagram: dict[str, list[Signal]] = {
@@ -247,19 +253,17 @@ class ExactConic(Part):
         m.submodules.output = out
         m.submodules.xt_register = self.xt
         m.submodules.yt_register = self.yt
-        empty = Signal()
         m.d.comb += [
             self.blocks.ready.eq(~self.held),
             self.accept.eq(self.blocks.valid & ~self.held),
-            empty.eq((self.next_turns == 0) & ~Cat(self.next_p3, self.next_p4).any()),
-            uu.pending.eq(self.held & (self.tick == 0)),
+            uu.pending.eq(self.prepared),
             uu.fault.eq(self.fault),
-            uu.empty.eq(empty),
+            uu.empty.eq(self.next_empty),
             uu.waiting.eq(out.waiting),
             uu.ready.eq(self.steps.ready),
             self.steps.valid.eq(out.waiting),
             self.steps.payload.last.eq(uu.last),
-            self.busy.eq(self.held | uu.busy),
+            self.busy.eq(self.held | ~uu.idle),
             self.done.eq(uu.done),
             self.error.eq(Value.cast(uu.error) | Value.cast(self.late)),
         ]
@@ -269,7 +273,9 @@ class ExactConic(Part):
             m.d.sync += self.held.eq(0)
         self._move(m)
         self._sum(m)
-        self._prepare(m, empty)
+        self._prepare(m)
+        with m.If(uu.start):
+            m.d.sync += self.prepared.eq(0)
         return m
 
     def _move(self, m: Module) -> None:
@@ -280,11 +286,12 @@ class ExactConic(Part):
         steps = {"x": ~steep | diagonal, "y": steep | diagonal}
         minor = {"x": steep, "y": ~steep}
         flip = Signal()
-        m.d.comb += flip.eq(self.turning & self.slows)
+        m.d.comb += flip.eq(self.turning & ~self.fresh & self.slows)
         close, passed, edge = [], [], []
         axes = (("x", self.p1, self.p3, self.xt), ("y", self.p2, self.p4, self.yt))
         for k, place, left, position in axes:
             pulse, move = Signal(name=f"pulse_{k}"), Signal(signed(2), name=f"move_{k}")
+            moves = ~self.turning & steps[k]
             wanted = steps[k]
             # −1, 0 or 1; and beyond it upwards or downwards.
             small = left[1:].all() | ~left[1:].any()
@@ -293,7 +300,8 @@ class ExactConic(Part):
             edge.append(wanted & (place[:-1] == Mux(down[k], 0, 2**n - 1)) & (place[-1] == down[k]))
             m.d.comb += [
                 pulse.eq(Mux(self.near, left.any(), self.goes & wanted)),
-                move.eq(Cat(pulse, pulse & Mux(self.near, left[-1], down[k]))),
+                # In the clock that ends the block they do not matter.
+                move.eq(Cat(moves, moves & down[k])),
                 out.carry[k].eq(pulse),
                 out.negative[k].eq(
                     Mux(
@@ -369,61 +377,69 @@ class ExactConic(Part):
                 across + beta + Mux(diagonal, gamma << 1, 0),
             ),
         )
-        after = []
+        # Right after a change of the frame the constants of the next one are not there yet.
+        waits, enable = Signal(), Signal()
+        m.d.comb += [
+            waits.eq(turning & self.fresh),
+            enable.eq(load | (self.uu.clock & ~waits)),
+        ]
         for register, loaded, changed, stepped in sums:
             value = self.between[f"{register.name}_after"]
             m.d.comb += value.eq(Mux(load, loaded, Mux(turning, changed, stepped)))
-            after.append(value)
-            with m.If(load | self.uu.clock):
+            with m.If(enable):
                 m.d.sync += register.eq(value)
 
         # The frame of the next clock, and what goes with it.
         flip, swap = turning & slows, turning & ~slows
-        frame = (
-            (alpha, Mux(load, self.a, Mux(swap, gamma, alpha))),
-            (beta, Mux(load, self.b, Mux(flip, -beta, beta))),
-            (gamma, Mux(load, self.c, Mux(swap, alpha, gamma))),
-            (self.slows, Mux(load, self.next_slows, slows ^ turning)),
-            (self.steep, Mux(load, self.next_steep, self.steep ^ swap)),
-            (self.turns, Mux(load, self.next_turns, self.turns - flip)),
-        )
-        new = [
-            self.between.get(f"{register.name}_after", Signal.like(register)) for register, _ in frame
+        new_slows, new_turns = Signal.like(slows), Signal.like(self.turns)
+        m.d.comb += [
+            self.between["alpha_after"].eq(Mux(load, self.a, Mux(swap, gamma, alpha))),
+            self.between["beta_after"].eq(Mux(load, self.b, Mux(flip, -beta, beta))),
+            self.between["gamma_after"].eq(Mux(load, self.c, Mux(swap, alpha, gamma))),
+            new_slows.eq(Mux(load, self.next_slows, slows ^ turning)),
+            new_turns.eq(Mux(load, self.next_turns, self.turns - flip)),
         ]
-        m.d.comb += [signal.eq(value) for signal, (_, value) in zip(new, frame, strict=True)]
-        new_alpha, new_beta, new_gamma, new_slows, _, new_turns = new
         stays = new_slows & (new_turns == 0)
-        with m.If(load | self.uu.clock):
+        alpha_2, beta_2, gamma_2 = alpha << 1, beta << 1, gamma << 1
+        with m.If(enable):
             m.d.sync += [
-                *[register.eq(value) for value, (register, _) in zip(new, frame, strict=True)],
-                diagonal.eq(~(after[0][-1] ^ new_slows)),
-                turning.eq(~after[1][-1] & ~stays),
+                alpha.eq(self.between["alpha_after"]),
+                beta.eq(self.between["beta_after"]),
+                gamma.eq(self.between["gamma_after"]),
+                slows.eq(new_slows),
+                self.turns.eq(new_turns),
+                self.steep.eq(Mux(load, self.next_steep, self.steep ^ swap)),
+                diagonal.eq(~(self.between["residual_after"][-1] ^ new_slows)),
+                turning.eq(~self.between["outer_after"][-1] & ~stays),
+                self.fresh.eq(load | turning),
             ]
+            with m.If(load):
+                m.d.sync += [self.outer_straight.eq(self.d), self.outer_aslant.eq(self.e)]
+            with m.Elif(turning):
+                m.d.sync += [
+                    self.outer_straight.eq(Mux(slows, -beta - alpha_2, -beta_2)),
+                    self.outer_aslant.eq(Mux(slows, gamma_2 - alpha_2, -beta_2 - (alpha << 2))),
+                ]
+        with m.Elif(self.uu.clock):
+            m.d.sync += self.fresh.eq(0)
         more = self.between
         m.d.comb += [
-            more["more_alpha"].eq(new_alpha + (new_alpha >> 1)),
-            more["more_beta"].eq((new_beta << 1) + (new_beta >> 1)),
-            more["more_gamma"].eq((new_gamma << 2) - (new_gamma >> 1)),
+            more["more_alpha"].eq(alpha + (alpha >> 1)),
+            more["more_beta"].eq(beta_2 + (beta >> 1)),
+            more["more_gamma"].eq((gamma << 2) - (gamma >> 1)),
         ]
-        beta_2, gamma_4 = new_beta << 1, new_gamma << 2
-        alpha_2, gamma_2 = new_alpha << 1, new_gamma << 1
         pairs = (
-            (self.outer_straight, -beta_2, new_beta - alpha_2),
-            (self.outer_aslant, -beta_2 - gamma_4, gamma_2 - alpha_2),
             (
                 self.turn_outer,
                 more["more_alpha"] + more["more_beta"] + more["more_gamma"],
-                (new_alpha << 2) + alpha_2 - new_beta,
+                (alpha << 2) + alpha_2 - beta,
             ),
-            (self.turn_axial, -beta_2, gamma_2 - new_beta - beta_2),
-            (self.turn_across, gamma_4, beta_2 - new_alpha - (new_beta >> 1)),
+            (self.turn_axial, -beta_2, gamma_2 - beta - beta_2),
+            (self.turn_across, gamma << 2, beta_2 - alpha - (beta >> 1)),
         )
-        with m.If(load | (self.uu.clock & turning)):
-            m.d.sync += [
-                register.eq(Mux(new_slows, slow, fast)) for register, slow, fast in pairs
-            ]
+        m.d.sync += [register.eq(Mux(slows, slow, fast)) for register, slow, fast in pairs]
 
-    def _prepare(self, m: Module, empty: Signal) -> None:
+    def _prepare(self, m: Module) -> None:
         """Multiply the start by the coefficients, bit by bit, and find the frame it begins in."""
         n, tick, block = self.width, self.tick, self.blocks.payload
         a, b, c, d, e, gx, gy = self.a, self.b, self.c, self.d, self.e, self.gx, self.gy
@@ -464,7 +480,9 @@ class ExactConic(Part):
                 m.d.sync += [gx.eq(Mux(tick == n + 2, gx, gx << 1) + d), gy.eq(gy + e)]
             with m.If(tick == n + 3):
                 rising, falling = gx + gy, gx - gy
+                no_way = ~Cat(self.next_p3, self.next_p4).any()
                 m.d.sync += [
+                    self.next_empty.eq((self.next_turns == 0) & no_way),
                     self.still_x.eq(gy == 0),
                     self.still_y.eq(gx == 0),
                     self.leads_x.eq(rising[-1] ^ falling[-1]),
@@ -492,7 +510,7 @@ class ExactConic(Part):
                 ]
             with m.If(tick == n + 7):
                 sharp = (total < (self.bend << 2)) | (self.still_x & self.still_y)
-                with m.If(~empty & sharp):
+                with m.If(~self.next_empty & sharp):
                     m.d.sync += self.fault.eq(ErrorCode.SHARP)
                 m.d.sync += [
                     total.eq((gx << 1) + gy),
@@ -501,7 +519,14 @@ class ExactConic(Part):
                     e.eq(Mux(slows, (a << 1) - b + (c >> 1), (c << 1) + b + (a >> 1))),
                 ]
             with m.If(tick == n + 8):
-                m.d.sync += [total.eq(total + d), outer.eq(outer + e)]
+                # What is left of a frame is what its steps add to the outer residual.
+                m.d.sync += [
+                    total.eq(total + d),
+                    outer.eq(outer + e),
+                    d.eq(Mux(slows, -(b << 1), b - (a << 1))),
+                    e.eq(Mux(slows, -(b << 1) - (c << 2), (c << 1) - (a << 1))),
+                    self.prepared.eq(1),
+                ]
 
     def _frame(self, m: Module) -> None:
         """Tell the directions at the start, the axis that leads, and whether the other one slows.

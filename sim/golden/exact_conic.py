@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 from discreta.sim.golden.logic import Value, equal, less, negate, where
 
-__all__ = ["TURNS_BITS", "ExactConic"]
+__all__ = ["CHANGES", "EXTRAS", "TURNS_BITS", "ExactConic"]
 
 State = dict[str, Value]
 
@@ -30,8 +30,9 @@ RANGE, OFF_CURVE, SHARP = 1, 2, 3
 TURNS_BITS = 11
 
 #: Of a frame: what a step straight on and aslant adds to ``outer`` beside what it adds to
-#: ``residual``, and what a change adds to the registers.
-CONSTANTS = ("outer_straight", "outer_aslant", "turn_outer", "turn_axial", "turn_across")
+#: ``residual``; and what a change of the frame adds to the registers.
+EXTRAS = ("outer_straight", "outer_aslant")
+CHANGES = ("turn_outer", "turn_axial", "turn_across")
 
 
 def _keep(_name: str, value: Value) -> Value:
@@ -77,8 +78,8 @@ class ExactConic:
             "alpha": square,
             "beta": (n + 5, True),
             "gamma": square,
-            **dict.fromkeys(CONSTANTS, (n + 8, True)),
-            **dict.fromkeys(("steep", "slows", "diagonal", "turning"), flag),
+            **dict.fromkeys((*EXTRAS, *CHANGES), (n + 8, True)),
+            **dict.fromkeys(("steep", "slows", "diagonal", "turning", "fresh"), flag),
             "turns": (TURNS_BITS, False),
             "xt": point,
             "yt": point,
@@ -90,6 +91,7 @@ class ExactConic:
         }
         return kinds | {
             "held": flag,
+            "prepared": flag,
             "fault": (2, False),
             "tick": (self.last_tick.bit_length(), False),
             "a": square,
@@ -106,6 +108,7 @@ class ExactConic:
             **dict.fromkeys(("still_x", "still_y", "leads_x", "tie"), flag),
             **dict.fromkeys(("next_down_x", "next_down_y", "next_steep", "next_slows"), flag),
             "next_turns": (TURNS_BITS, False),
+            "next_empty": flag,
             "next_x": point,
             "next_y": point,
             "next_p3": way,
@@ -148,10 +151,9 @@ class ExactConic:
         taken = waiting & inputs["steps_ready"]
         free = negate(waiting) | inputs["steps_ready"]
         sound = equal(state["fault"], 0)
-        no_way = equal(state["next_p3"], 0) & equal(state["next_p4"], 0)
-        empty = equal(state["next_turns"], 0) & no_way
+        empty = state["next_empty"]
         next_may = where(empty | negate(sound), negate(waiting), free)
-        start = state["held"] & equal(state["tick"], 0) & negate(state["running"]) & next_may
+        start = state["prepared"] & negate(state["running"]) & next_may
         load = start & sound
         accept = inputs["blocks_valid"] & outputs["blocks_ready"]
         clock = state["running"] & free
@@ -172,7 +174,7 @@ class ExactConic:
         after["error"] = where(start, state["fault"], 0)
         after["late"] = ends["late"]
 
-        self._prepare(state, after, where(accept, 0, state["tick"]), empty)
+        self._prepare(state, after, where(accept, 0, state["tick"]))
         received = {k: inputs[f"blocks_{k}"] for k in ("a", "b", "c", "d", "e", "clockwise")}
         received |= {
             "next_x": inputs["blocks_start_x"],
@@ -187,6 +189,7 @@ class ExactConic:
         }
         after |= {name: where(accept, value, after[name]) for name, value in received.items()}
         after["held"] = where(accept, 1, where(start, 0, state["held"]))
+        after["prepared"] = where(start, 0, after["prepared"])
         return after
 
     def _run(
@@ -214,18 +217,23 @@ class ExactConic:
         late = where(missed, OFF_CURVE, where(outside, RANGE, 0))
         goes = negate(near | missed | event | outside)
 
-        flip = event & slows
+        flip = event & negate(state["fresh"]) & slows
         for k, p, way in (("x", "p1", "p3"), ("y", "p2", "p4")):
             pulse = where(near, negate(equal(left[k], 0)), goes & steps[k])
-            move = where(near, left[k], where(goes & steps[k], where(down[k], -1, 1), 0))
             minor = negate(steep) if k == "y" else steep
+            # In the clock that ends the block they do not matter.
+            move = where(steps[k] & negate(event), where(down[k], -1, 1), 0)
             self._set(after, clock, p, self._signed(place[k] + move, n + 1))
             self._set(after, clock, way, self._signed(left[k] - move, n + 2))
             after[f"pulse_{k}"] = pulse
             turned = where(near, less(left[k], 0), down[k] ^ (flip & minor))
             self._set(after, clock, f"direction_{k}", turned)
+        # Right after a change of the frame the constants of the next one are not there yet.
+        waits = event & state["fresh"]
         for name, value in self._summed(state, load, tell).items():
-            self._set(after, clock | load, name, value)
+            self._set(after, (clock & negate(waits)) | load, name, value)
+        self._set(after, clock & waits, "fresh", 0)
+        after |= self._changes(state, tell)
         ended = clock & (near | missed | outside)
         return {
             "ended": ended,
@@ -287,8 +295,16 @@ class ExactConic:
             "slows": where(load, state["next_slows"], slows ^ event),
         }
         after |= self._signs(after)
-        for name, value in self._constants(after, tell).items():
-            after[name] = where(load | event, value, state[name])
+        extras = {
+            "outer_straight": (0 - beta - 2 * alpha, 0 - 2 * beta),
+            "outer_aslant": (2 * gamma - 2 * alpha, 0 - 2 * beta - 4 * alpha),
+        }
+        for name, pair in extras.items():
+            value = self._signed(where(slows, *pair), kinds[name][0])
+            after[name] = where(event, value, state[name])
+        for name, value in zip(EXTRAS, (state["d"], state["e"]), strict=True):
+            after[name] = where(load, self._signed(value, kinds[name][0]), after[name])
+        after["fresh"] = load | event
         return after
 
     def _signs(self, frame: State) -> State:
@@ -299,25 +315,20 @@ class ExactConic:
             "turning": negate(less(frame["outer"], 0)) & negate(stays),
         }
 
-    def _constants(self, frame: State, tell: Callable) -> State:
-        """Give the constants of a frame."""
-        alpha, beta, gamma = frame["alpha"], frame["beta"], frame["gamma"]
+    def _changes(self, state: State, tell: Callable) -> State:
+        """Give what the next change of the frame adds, in every clock anew."""
+        alpha, beta, gamma = state["alpha"], state["beta"], state["gamma"]
         more_alpha = tell("more_alpha", alpha + (alpha >> 1))
         more_beta = tell("more_beta", 2 * beta + (beta >> 1))
         more_gamma = tell("more_gamma", 4 * gamma - (gamma >> 1))
         pairs = {
-            "outer_straight": (0 - 2 * beta, beta - 2 * alpha),
-            "outer_aslant": (0 - 2 * beta - 4 * gamma, 2 * gamma - 2 * alpha),
-            "turn_outer": (
-                more_alpha + more_beta + more_gamma,
-                4 * alpha + 2 * alpha - beta,
-            ),
+            "turn_outer": (more_alpha + more_beta + more_gamma, 4 * alpha + 2 * alpha - beta),
             "turn_axial": (0 - 2 * beta, 2 * gamma - beta - 2 * beta),
             "turn_across": (4 * gamma, 2 * beta - alpha - (beta >> 1)),
         }
         kinds = self.registers()
         return {
-            name: self._signed(where(frame["slows"], *pair), kinds[name][0])
+            name: self._signed(where(state["slows"], *pair), kinds[name][0])
             for name, pair in pairs.items()
         }
 
@@ -336,7 +347,7 @@ class ExactConic:
         for name, value in loaded.items():
             self._set(after, load, name, value)
 
-    def _prepare(self, state: State, after: State, tick: Value, empty: Value) -> None:
+    def _prepare(self, state: State, after: State, tick: Value) -> None:
         """Horner's rule, bit by bit; then the frame of the first piece and the residuals in it."""
         n = self.width
         a, b, c, gx, gy = (state[k] for k in ("a", "b", "c", "gx", "gy"))
@@ -362,6 +373,8 @@ class ExactConic:
         put(2, next_p3=state["next_p3"] - state["next_x"])
         put(2, next_p4=state["next_p4"] - state["next_y"])
 
+        no_way = equal(state["next_p3"], 0) & equal(state["next_p4"], 0)
+        put(3, next_empty=equal(state["next_turns"], 0) & no_way)
         rising, falling = gx + gy, gx - gy
         put(3, still_x=equal(gy, 0), still_y=equal(gx, 0))
         put(3, leads_x=less(rising, 0) ^ less(falling, 0))
@@ -390,13 +403,16 @@ class ExactConic:
         put(6, next_residual=where(slows, gy - gx, gx - gy))
         put(6, d=4 * a + 2 * a + b, e=2 * (b + c))
         sharp = less(state["next_residual"], 4 * state["bend"]) | (still_x & still_y)
-        self._set(after, at[7] & negate(empty) & sharp, "fault", SHARP)
+        self._set(after, at[7] & negate(state["next_empty"]) & sharp, "fault", SHARP)
         put(7, gx=2 * gx + state["d"], gy=gy + state["e"], next_residual=2 * gx + gy)
         put(7, next_outer=where(slows, 2 * gx - gy, 2 * gy + gx))
         put(7, d=2 * a + b + (c >> 1))
         put(7, e=where(slows, 2 * a - b + (c >> 1), 2 * c + b + (a >> 1)))
         put(8, next_residual=state["next_residual"] + state["d"])
         put(8, next_outer=state["next_outer"] + state["e"])
+        # What is left of a frame is what its steps add to the outer residual.
+        put(8, d=where(slows, 0 - 2 * b, b - 2 * a))
+        put(8, e=where(slows, 0 - 2 * b - 4 * c, 2 * c - 2 * a), prepared=1)
         counted = (tick + 1) & (2 ** self.last_tick.bit_length() - 1)
         after["tick"] = where(at[8] | equal(tick, 0), 0, counted)
 
