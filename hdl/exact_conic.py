@@ -15,8 +15,8 @@ __all__ = ["MAX_WIDTH", "ExactConic", "preparation_clocks"]
 
 
 def preparation_clocks(width: int) -> int:
-    """Give the clocks from the acceptance of a block to the one that may start it: n + 10."""
-    return width + 10
+    """Give the clocks from the acceptance of a block to the one that may start it: n + 9."""
+    return width + 9
 
 
 class ExactConic(Part):

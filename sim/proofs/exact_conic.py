@@ -17,9 +17,11 @@ Notation: u is the axis that leads, v the other one, g and h the derivatives by 
 direction of the piece, α, β, γ the coefficients of u², u·v and v².
 """
 
+from itertools import product
+
 import z3
 
-from discreta.sim.golden.exact_conic import CONSTANTS, ExactConic
+from discreta.sim.golden.exact_conic import CHANGES, EXTRAS, ExactConic
 from discreta.sim.golden.logic import Value, where
 from discreta.sim.smt import Obligation, numbers
 
@@ -44,7 +46,8 @@ class _Registers:
     def __init__(self, golden: ExactConic):
         self.golden = golden
         self.width = n = golden.width
-        self.wide = golden.residual_bits + 8
+        # As wide as the residuals: their sums need no bits taken off.
+        self.wide = golden.residual_bits
         self.kinds = kinds = golden.registers()
         self.ranges: list[z3.BoolRef] = []
         self.state = state = self.numbers(kinds)
@@ -69,15 +72,22 @@ class _Registers:
         self.running = state["running"] == 1
         self.clock = z3.And(self.running, self.free)
         self.ends = z3.And(self.clock, self.after["running"] == 0)
+        # What the point moves by in a clock that does not end the block.
+        leads = {"x": state["steep"] == 0, "y": state["steep"] == 1}
         self.moves = {
-            a: where(self._bit(self.clock), self.after[p] - state[p], self._number(0))
-            for a, (p, *_) in AXES.items()
+            a: z3.If(
+                z3.And(
+                    self.clock, state["turning"] == 0, z3.Or(leads[a], state["diagonal"] == 1)
+                ),
+                where(state[f"direction_{a}"], self._number(-1), self._number(1)),
+                self._number(0),
+            )
+            for a in "xy"
         }
 
         # The next block starts: it is taken over, or refused, or has nothing to do.
-        no_way = z3.And(state["next_p3"] == 0, state["next_p4"] == 0)
-        self.empty = z3.And(no_way, state["next_turns"] == 0)
-        self.pending = z3.And(state["held"] == 1, state["tick"] == 0)
+        self.empty = state["next_empty"] == 1
+        self.pending = state["prepared"] == 1
         still = z3.Or(self.empty, state["fault"] != 0)
         may = z3.If(still, z3.Not(self.waiting), self.free)
         self.start = z3.And(self.pending, z3.Not(self.running), may)
@@ -90,6 +100,10 @@ class _Registers:
             self.ranges += [z3.And(ghosts[k] >= -most, ghosts[k] <= most) for k in "XY"]
         self.ghosts_after = self._moved()
         self.next_ghosts_after = self._captured()
+        #: Derivatives are within these everywhere: that is shown of the numbers.
+        self.bounds = [
+            z3.And(self.ghosts_after[k] >= -most, self.ghosts_after[k] <= most) for k in "XY"
+        ]
 
     def _ghosts(self, prefix: str) -> dict[str, Value]:
         n = self.width
@@ -102,9 +116,10 @@ class _Registers:
 
     def numbers(self, kinds: dict[str, tuple[int, bool]], prefix: str = "") -> dict[str, Value]:
         """Make symbols, and keep their ranges for :meth:`obligation`."""
-        values, ranges = numbers(kinds, self.wide, prefix)
+        narrow = {name: kind for name, kind in kinds.items() if kind[0] < self.wide}
+        values, ranges = numbers(narrow, self.wide, prefix)
         self.ranges += ranges
-        return values
+        return {name: z3.BitVec(prefix + name, self.wide) for name in kinds} | values
 
     def obligation(self, title: str, assumptions: list, claims: dict) -> Obligation:
         """State something about the symbols."""
@@ -125,21 +140,24 @@ class _Registers:
 
     def _moved(self) -> dict[str, Value]:
         """Give the ghosts of the block that runs after a clock: moved, or those of the next one."""
+        moved, loaded = self._advanced(self.moves), self.next_ghosts | {"F": self._number(0)}
+        return {name: z3.If(self.load, loaded[name], value) for name, value in moved.items()}
+
+    def _advanced(self, moves: dict[str, Value]) -> dict[str, Value]:
+        """Give the ghosts of the block that runs after the point has moved."""
         old = self.ghosts
-        dx, dy = self.moves["x"], self.moves["y"]
+        dx, dy = moves["x"], moves["y"]
 
         def by(step: Value, value: Value) -> Value:
             return where(step, where(self._bit(step < 0), -value, value), self._number(0))
 
         both = by(dx, by(dy, old["B"]))
         squares = where(dx, old["A"], self._number(0)) + where(dy, old["C"], self._number(0))
-        moved = old | {
+        return old | {
             "F": old["F"] + by(dx, old["X"]) + by(dy, old["Y"]) + squares + both,
             "X": old["X"] + by(dx, 2 * old["A"]) + by(dy, old["B"]),
             "Y": old["Y"] + by(dx, old["B"]) + by(dy, 2 * old["C"]),
         }
-        loaded = self.next_ghosts | {"F": self._number(0)}
-        return {name: z3.If(self.load, loaded[name], value) for name, value in moved.items()}
 
     def _captured(self) -> dict[str, Value]:
         """Give the ghosts of the block that is prepared after a clock."""
@@ -174,31 +192,53 @@ class _Registers:
         led = 2 * f + 2 * h + g + 2 * gamma + beta + (alpha >> 1)
         return ahead, where(slows, turned, led)
 
+    @staticmethod
+    def _extras(frame: dict[str, Value]) -> dict[str, tuple[Value, Value]]:
+        """Give what steps add to the outer residual alone, where v slows down and where not."""
+        alpha, beta, gamma = (frame[k] for k in ("alpha", "beta", "gamma"))
+        return {
+            "outer_straight": (-2 * beta, beta - 2 * alpha),
+            "outer_aslant": (-2 * beta - 4 * gamma, 2 * gamma - 2 * alpha),
+        }
+
+    @staticmethod
+    def _constants(frame: dict[str, Value]) -> dict[str, tuple[Value, Value]]:
+        """Give what the next change of the frame adds, where v slows down and where not."""
+        alpha, beta, gamma = (frame[k] for k in ("alpha", "beta", "gamma"))
+        more = (alpha + (alpha >> 1)) + (2 * beta + (beta >> 1)) + (4 * gamma - (gamma >> 1))
+        return {
+            "turn_outer": (more, 4 * alpha + 2 * alpha - beta),
+            "turn_axial": (-2 * beta, 2 * gamma - beta - 2 * beta),
+            "turn_across": (4 * gamma, 2 * beta - alpha - (beta >> 1)),
+        }
+
     # --- what there is to say of a state
 
-    def summed(self, state: dict, ghosts: dict) -> dict[str, z3.BoolRef]:
-        """State that the registers of the running block are what the curve says."""
+    def summed(
+        self, state: dict, ghosts: dict, *, modular: bool = False
+    ) -> dict[str, z3.BoolRef]:
+        """State that the registers of the running block are what the curve says.
+
+        With ``modular`` axial and across are meant in as many bits as they have.
+        """
         slows = state["slows"]
         frame = self._frame(ghosts, state["steep"], state["direction_x"], state["direction_y"])
         ahead, other = self._middles(frame, ghosts["F"], slows)
         axial = 2 * frame["g"] + 6 * frame["alpha"] + frame["beta"]
         across = frame["h"] + 2 * frame["beta"] + 2 * frame["gamma"]
         stays = z3.And(slows == 1, state["turns"] == 0)
-        alpha, beta, gamma = (frame[k] for k in ("alpha", "beta", "gamma"))
-        constants = {
-            "outer_straight": (-2 * beta, beta - 2 * alpha),
-            "outer_aslant": (-2 * beta - 4 * gamma, 2 * gamma - 2 * alpha),
-            "turn_outer": (
-                alpha + (alpha >> 1) + 2 * beta + (beta >> 1) + 4 * gamma - (gamma >> 1),
-                6 * alpha - beta,
-            ),
-            "turn_axial": (-2 * beta, 2 * gamma - 3 * beta),
-            "turn_across": (4 * gamma, 2 * beta - alpha - (beta >> 1)),
-        }
+        constants = self._extras(frame) | self._constants(state)
         values = {"residual": ahead, "outer": other, "axial": axial, "across": across}
         values |= {name: frame[name] for name in ("alpha", "beta", "gamma")}
-        facts = {name: self._is(name, state[name], value) for name, value in values.items()}
-        facts |= {name: state[name] == where(slows, *constants[name]) for name in CONSTANTS}
+        facts = {name: state[name] == value for name, value in values.items()}
+        if modular:
+            facts |= {k: self._is(k, state[k], values[k]) for k in ("axial", "across")}
+        facts |= {name: state[name] == where(slows, *constants[name]) for name in EXTRAS}
+        settled = state["fresh"] == 0
+        facts |= {
+            name: z3.Implies(settled, state[name] == where(slows, *constants[name]))
+            for name in CHANGES
+        }
         facts["diagonal"] = (state["diagonal"] == 1) == (
             z3.If(slows == 1, state["residual"] < 0, state["residual"] >= 0)
         )
@@ -221,7 +261,8 @@ class _Registers:
         def at(k: int) -> z3.BoolRef:
             return z3.And(held, tick == n + k)
 
-        done = z3.And(held, tick == 0)
+        done = state["prepared"] == 1
+        extras = self._extras(frame)
         turned = z3.Or(z3.And(held, tick > n + 5), done)
         axial, across = 2 * g + 6 * alpha + beta, h + 2 * beta + 2 * gamma
         way = {
@@ -243,6 +284,24 @@ class _Registers:
             | end
             | {
                 "tick": z3.And(tick >= 0, tick <= last, z3.Implies(tick > 0, held)),
+                "prepared": z3.And(
+                    z3.Implies(done, z3.And(held, tick == 0)),
+                    z3.Implies(z3.And(held, tick == 0), done),
+                ),
+                "empty": z3.Implies(
+                    z3.Or(z3.And(held, tick > n + 3), done),
+                    (state["next_empty"] == 1)
+                    == z3.And(
+                        *(state[name] == 0 for name in ("next_turns", "next_p3", "next_p4"))
+                    ),
+                ),
+                "extras": z3.Implies(
+                    done,
+                    z3.And(
+                        state["d"] == where(slows, *extras["outer_straight"]),
+                        state["e"] == where(slows, *extras["outer_aslant"]),
+                    ),
+                ),
                 "fault": z3.Or(state["fault"] == 0, state["fault"] == SHARP),
                 "no fault yet": z3.Implies(z3.And(tick > 0, tick < n + 8), state["fault"] == 0),
                 "coefficients": z3.Implies(z3.And(held, tick > 0, tick < n + 6), raw),
@@ -263,10 +322,7 @@ class _Registers:
                 ),
                 "axial, across": z3.Implies(
                     z3.Or(at(8), done),
-                    z3.And(
-                        self._is("axial", state["gx"], axial),
-                        self._is("across", state["gy"], across),
-                    ),
+                    z3.And(state["gx"] == axial, state["gy"] == across),
                 ),
                 "second sums": z3.Implies(
                     at(8),
@@ -279,10 +335,7 @@ class _Registers:
                 ),
                 "residuals": z3.Implies(
                     done,
-                    z3.And(
-                        self._is("residual", state["next_residual"], ahead),
-                        self._is("outer", state["next_outer"], other),
-                    ),
+                    z3.And(state["next_residual"] == ahead, state["next_outer"] == other),
                 ),
             }
         )
@@ -300,10 +353,10 @@ class _Registers:
                     running, state[left] == ghosts[f"end_{a}"] - state[p]
                 ),
                 f"{p} and the step that waits": z3.Implies(
-                    z3.Or(running, pulses), state[p] == state[position] + step
+                    running, state[p] == state[position] + step
                 ),
-                f"{p} at the end": z3.Implies(
-                    z3.And(pulses, z3.Not(running)), state[p] == ghosts[f"end_{a}"]
+                f"{a}: the step that waits leads to the end": z3.Implies(
+                    z3.And(pulses, z3.Not(running)), state[position] + step == ghosts[f"end_{a}"]
                 ),
             }
         return facts
@@ -322,6 +375,121 @@ class _Registers:
         """Give the obligations."""
         return [*self._induction(), *self._preparation(), *self._path(), *self._answers()]
 
+    def _cases(self) -> dict[str, z3.BoolRef]:
+        """State that a clock pulse, and a start, keep what is known of the residuals.
+
+        In each case, by frame and by what the clock does, the sums are all there is to compare.
+        """
+        state, golden = self.state, self.golden
+        names = ("steep", "slows", "turning", "diagonal", "direction_x", "direction_y")
+        claims = {}
+        for bits in product((0, 1), repeat=len(names)):
+            known = dict(zip(names, bits, strict=True))
+            here = state | {name: self._number(bit) for name, bit in known.items()}
+            after = golden._summed(here, self._number(0), _keep)
+            after |= {"running": self._number(1)}
+            # The slower axis turns round.
+            flips = known["turning"] & known["slows"]
+            after["direction_x"] = here["direction_x"] ^ (flips & known["steep"])
+            after["direction_y"] = here["direction_y"] ^ (flips & (1 - known["steep"]))
+            if not known["turning"]:
+                after |= {name: here[name] for name in ("alpha", "beta", "gamma")}
+            constants = self._constants(here)
+            after |= {name: constants[name][1 - known["slows"]] for name in CHANGES}
+            half = (here["axial"] >> 1, self._half(here))
+            after = {name: z3.substitute(value, half) for name, value in after.items()}
+            way = {
+                "x": (not known["steep"] or known["diagonal"]) and not known["turning"],
+                "y": (known["steep"] or known["diagonal"]) and not known["turning"],
+            }
+            moves = {
+                a: self._number((1 - 2 * known[f"direction_{a}"]) if way[a] else 0) for a in "xy"
+            }
+            case = [state[name] == bit for name, bit in known.items()]
+            case += [state["running"] == 1, z3.Or(state["turning"] == 0, state["fresh"] == 0)]
+            words = "".join(map(str, bits))
+            for name, fact in self.summed(after, self._advanced(moves), modular=True).items():
+                claims[f"{name} {words}"] = z3.Implies(z3.And(*case), z3.simplify(fact))
+        frame = ("next_steep", "next_slows", "next_down_x", "next_down_y")
+        loaded = golden._summed(state, self._number(1), _keep) | {"running": self._number(1)}
+        loaded |= {f"direction_{a}": state[f"next_down_{a}"] for a in "xy"}
+        loaded |= dict.fromkeys(CHANGES, self._number(0))
+        ghosts = self.next_ghosts | {"F": self._number(0)}
+        for bits in product((0, 1), repeat=len(frame)):
+            case = [state[k] == bit for k, bit in zip(frame, bits, strict=True)]
+            case += [state["prepared"] == 1, state["held"] == 1, state["tick"] == 0]
+            words = "".join(map(str, bits))
+            for name, fact in self.summed(loaded, ghosts).items():
+                claims[f"{name} at a start {words}"] = z3.Implies(z3.And(*case), fact)
+        return claims
+
+    def _handed(self) -> dict[str, z3.BoolRef]:
+        """State that these are just what the registers become."""
+        state, after, golden = self.state, self.after, self.golden
+        waits = z3.And(state["turning"] == 1, state["fresh"] == 1)
+        pulse = golden._summed(state, self._number(0), _keep)
+        start = golden._summed(state, self._number(1), _keep)
+        claims = {}
+        for name in pulse:
+            kept = self._number(0) if name == "fresh" else state[name]
+            claims |= {
+                f"{name} by a pulse": z3.Implies(
+                    z3.And(self.clock, z3.Not(waits)), after[name] == pulse[name]
+                ),
+                f"{name} at a start": z3.Implies(self.load, after[name] == start[name]),
+                f"{name} in a wait": z3.Implies(z3.And(self.clock, waits), after[name] == kept),
+                f"{name} kept": z3.Implies(
+                    z3.Not(z3.Or(self.clock, self.load)), after[name] == state[name]
+                ),
+            }
+        claims |= {
+            f"{name} in a step": z3.Implies(state["turning"] == 0, pulse[name] == state[name])
+            for name in ("alpha", "beta", "gamma")
+        }
+        flips = z3.And(state["turning"] == 1, state["fresh"] == 0, state["slows"] == 1)
+        goes = z3.And(self.clock, z3.Not(self.ends))
+        for a, minor in (("x", state["steep"] == 1), ("y", state["steep"] == 0)):
+            name = f"direction_{a}"
+            turned = z3.If(z3.And(flips, minor), 1 - state[name], state[name])
+            claims |= {
+                f"{name} by a pulse": z3.Implies(goes, after[name] == turned),
+                f"{name} at a start": z3.Implies(self.load, after[name] == state[f"next_down_{a}"]),
+                f"{name} kept": z3.Implies(
+                    z3.Not(z3.Or(self.clock, self.load)), after[name] == state[name]
+                ),
+            }
+        kept = self._constants(state)
+        small = z3.And(state["beta"] <= 2 ** (self.width + 3), state["beta"] > -(2 ** (self.width + 4)))
+        claims |= {
+            f"{name} anew": z3.Implies(small, after[name] == where(state["slows"], *kept[name]))
+            for name in CHANGES
+        }
+        return claims
+
+    def _frame_of(self, state: dict) -> dict[str, Value]:
+        return self._frame(self.ghosts, *(state[k] for k in ("steep", "direction_x", "direction_y")))
+
+    def _half(self, state: dict) -> Value:
+        """Give half of what axial is, rounded down."""
+        frame = self._frame_of(state)
+        return frame["g"] + 3 * frame["alpha"] + (frame["beta"] >> 1)
+
+    def _ticks(self, facts: dict[str, z3.BoolRef]) -> dict[str, z3.BoolRef]:
+        """Split what is claimed of a preparation by the clock, and by the frame if it is known."""
+        state, n = self.state, self.width
+        names = ("next_steep", "next_slows", "next_down_x", "next_down_y")
+        claims = {}
+        for name, fact in facts.items():
+            rest = z3.Or(state["tick"] < n + 5, state["held"] == 0)
+            claims[f"{name} before"] = z3.Implies(rest, fact)
+            for tick in range(n + 5, n + 9):
+                for bits in product((0, 1), repeat=len(names)):
+                    case = [state[k] == bit for k, bit in zip(names, bits, strict=True)]
+                    now = z3.And(state["tick"] == tick, state["held"] == 1, *case)
+                    words = "".join(map(str, bits))
+                    claims[f"{name} {tick} {words}"] = z3.Implies(now, fact)
+        return claims
+
     def _induction(self) -> list[Obligation]:
         state, after = self.state, self.after
         known = self.invariant(state, self.ghosts, self.next_ghosts)
@@ -339,14 +507,57 @@ class _Registers:
                 "residuals: of a block that runs residual is 2F in the middle between the two "
                 "points ahead, outer that of the frame to come; axial and across, the coefficients "
                 "and the constants are those of the frame, diagonal and turning what the signs say",
-                [*summed, *prepared],
-                self.summed(after, self.ghosts_after),
+                [*summed, *prepared, *self.bounds],
+                self._cases(),
+            ),
+            self.obligation(
+                "residuals: axial and across are what they are in their own bits, since neither "
+                "these nor what they stand for can be more",
+                [
+                    z3.And(value >= -(2 ** (bits - 1)), value < 2 ** (bits - 1))
+                    for value, bits in (
+                        (self.ghosts["F"], self.golden.bits + 1),
+                        (self.next_ghosts["F"], self.golden.bits),
+                    )
+                ],
+                {
+                    "axial": z3.Implies(
+                        self._is("axial", state["axial"], self.ghosts["F"]),
+                        state["axial"] == self.ghosts["F"],
+                    ),
+                    "across": z3.Implies(
+                        self._is("across", state["across"], self.next_ghosts["F"]),
+                        state["across"] == self.next_ghosts["F"],
+                    ),
+                },
+            ),
+            self.obligation(
+                "residuals: half of axial, rounded down, is g + 3α and half of β",
+                [],
+                {
+                    "half": z3.Implies(
+                        state["axial"]
+                        == 2 * self._half(state)
+                        + (self._frame_of(state)["beta"] & 1),
+                        state["axial"] >> 1 == self._half(state),
+                    ),
+                    "axial": 2 * self._half(state) + (self._frame_of(state)["beta"] & 1)
+                    == 2 * self._frame_of(state)["g"]
+                    + 6 * self._frame_of(state)["alpha"]
+                    + self._frame_of(state)["beta"],
+                },
+            ),
+            self.obligation(
+                "residuals: a clock pulse and a start make just that of the registers, and nothing "
+                "else changes them",
+                [],
+                self._handed(),
             ),
             self.obligation(
                 "preparation: from the derivatives at the start to the frame, its sums and the "
                 "residuals of the start, where F = 0",
                 prepared,
-                self.prepared(after, self.next_ghosts_after),
+                self._ticks(self.prepared(after, self.next_ghosts_after)),
             ),
             self.obligation(
                 "place: P3 and P4 are the way to the end, P1 and P2 the position with the step "
@@ -472,8 +683,9 @@ class _Registers:
         room, room_after = self._room(state), self._room(after)
         goes = z3.And(self.clock, z3.Not(self.ends))
         event = state["turning"] == 1
-        flips = z3.And(goes, event, state["slows"] == 1)
-        swaps = z3.And(goes, event, state["slows"] == 0)
+        settled = state["fresh"] == 0
+        flips = z3.And(goes, event, settled, state["slows"] == 1)
+        swaps = z3.And(goes, event, settled, state["slows"] == 0)
         stepped = z3.And(goes, z3.Not(event))
         leads = {"x": state["steep"] == 0, "y": state["steep"] == 1}
         pulses = z3.Or(*(after[f"pulse_{a}"] == 1 for a in "xy"))
@@ -488,23 +700,27 @@ class _Registers:
                 "one step: in a clock each axis moves by one step at most, and no coordinate wraps",
                 known,
                 {
-                    f"{p} by one": z3.Implies(
-                        self.clock,
-                        z3.And(after[p] - state[p] >= -1, after[p] - state[p] <= 1),
-                    )
-                    for p in ("p1", "p2")
+                    f"{p} by one": z3.Implies(goes, after[p] == state[p] + self.moves[a])
+                    for a, (p, *_) in AXES.items()
                 }
                 | {
                     f"{a} as it is put out": z3.Implies(
-                        self.clock,
-                        after[p] - state[p]
+                        goes,
+                        self.moves[a]
                         == where(
                             after[f"pulse_{a}"],
                             where(after[f"direction_{a}"], self._number(-1), self._number(1)),
                             self._number(0),
                         ),
                     )
-                    for a, (p, *_) in AXES.items()
+                    for a in "xy"
+                }
+                | {
+                    f"{position} by one": z3.Or(
+                        self.load,
+                        *(after[position] == state[position] + step for step in (-1, 0, 1)),
+                    )
+                    for _, _, position in AXES.values()
                 },
             ),
             self.obligation(
@@ -547,9 +763,13 @@ class _Registers:
                     "leads": z3.Implies(
                         swaps,
                         z3.And(
-                            after["turns"] == state["turns"], after["slows"] == 1,
+                            *(after["turns"] == state["turns"], after["slows"] == 1),
                             room_after == room,
                         ),
+                    ),
+                    "a wait is one clock": z3.Implies(
+                        z3.And(goes, event, state["fresh"] == 1),
+                        z3.And(after["fresh"] == 0, after["turning"] == 1),
                     ),
                 },
             ),
@@ -661,6 +881,10 @@ class _Registers:
         ]
 
 
+def _keep(_name: str, value: Value) -> Value:
+    return value
+
+
 def _numbers(golden: ExactConic) -> list[Obligation]:
     """What the additions come to, in whole numbers."""
     n = golden.width
@@ -742,13 +966,13 @@ def _numbers(golden: ExactConic) -> list[Obligation]:
             True,
         ),
         Obligation(
-            "it always ends: within a frame there is a clock for each step of room at most, and "
-            "two frames to a turn: fewer than (turns + 1)·2·(2^(n + 2) + 1) clocks",
+            "it always ends: within a frame there is a clock for each step of room at most, a wait "
+            "and a change, and two frames to a turn: fewer than (turns + 1)·2·(2^(n + 2) + 2) clocks",
             [
                 *(turns >= 0, room >= 0, room < 2 ** (n + 2)),
-                steps <= 2 * (turns + 1) * (room + 1),
+                steps <= 2 * (turns + 1) * (room + 2),
             ],
-            {"clocks": steps < 2 * (turns + 1) * (2 ** (n + 2) + 1)},
+            {"clocks": steps < 2 * (turns + 1) * (2 ** (n + 2) + 2)},
             True,
         ),
     ]
