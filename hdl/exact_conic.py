@@ -43,19 +43,19 @@ class ExactConic(Part):
     is not (``diagonal``). There is no multiplier.
 
     Frames: v speeds up until it is as fast as u, then it leads and the other one slows down, until
-    it stands still and turns round. The curve itself tells when: if the point between (1, 1) and
-    (1, 2), or below (1, 0) and (1, −1), is not beyond it, neither candidate is the nearest. The
-    signs of these outer residuals are worked out together with the residual, one step ahead
-    (``turning``), and one clock without a step changes the frame::
+    it stands still and turns round. ``outer`` is what ``residual`` would be in the frame to come,
+    moved along like it. When it says that the curve passes beside both candidates (``turning``),
+    one clock without a step changes the frame: ``residual`` becomes ``outer``, and::
 
-        v turns round:  residual −= 2·across − 2β − 4γ;  axial −= 2β;  across := 4γ − across
-                        β := −β
-        v leads:        residual += across − ⌊axial/2⌋ + α − 2β + ⌊α/2⌋ + ⌊β/2⌋ − ⌊γ/2⌋
+        v turns round:  outer  += α + ⌊α/2⌋ + 2β + ⌊β/2⌋ + 4γ − ⌊γ/2⌋ − ⌊axial/2⌋ − across
+                        axial  −= 2β;  across := 4γ − across;  β := −β
+        v leads:        outer  += 6α − β − axial
                         axial, across := 2·across + 2γ − 3β, ⌊axial/2⌋ + 2β − α − ⌊β/2⌋
                         α, γ := γ, α
 
-    The constants of the change to come wait in ``to_residual``, ``to_axial`` and ``to_across``: so
-    a step lies between two changes.
+    What these add is worked out in the clock after a change (``turn_outer``, ``turn_axial``,
+    ``turn_across``). Should the next change follow at once, as it can where the radius of curvature
+    is below 3.5 steps, it waits a clock (``fresh``).
 
     The end: with one change of direction to come or none, a point from which the end is a king's
     move away (or nothing) is the last but one; that move is the last step, with ``last``. A change
@@ -64,22 +64,22 @@ class ExactConic(Part):
     OFF_CURVE or RANGE, in place of ``done``: steps were made, none of them was ``last``, and
     ``position`` is where they led. Only blocks that discreta.sim.conics refuses or whose curve ends
     half a step beyond the edge of the coordinates can end like that. A block always ends: two
-    changes of the frame a turn, and between two changes of direction each axis goes one way. (Should
-    a block with wrong ``turns`` stand on its end with one to come, ``done`` follows at once.)
+    changes of the frame a turn, and between two changes of direction each axis goes one way. (If a
+    block with wrong ``turns`` stands on its end with one to come, ``done`` follows at once.)
 
-    Registers: ``residual``, ``axial``, ``across``; ``alpha``, ``beta``, ``gamma`` = α, β, γ; P1, P2
-    = x, y; P3, P4 = way to the end, signed; XT, YT = coordinates now; ``steep`` = y leads,
-    ``slows`` = v slows down; ``turns``. Those of a prepared block begin with ``next_``, or are
-    A…E, GX, GY.
+    Registers: ``residual``, ``outer``, ``axial``, ``across``; ``alpha``, ``beta``, ``gamma`` = α,
+    β, γ; the constants of the frame; P1, P2 = x, y; P3, P4 = way to the end, signed; XT, YT =
+    coordinates now; ``steep`` = y leads, ``slows`` = v slows down; ``turns``. Those of a prepared
+    block begin with ``next_``, or are A…E, GX, GY.
 
-    Latency: a block accepted in clock 0 is prepared from clock 1 to n + 9 in registers of its own,
-    while the block before runs. It starts in clock n + 10 or, if that is later, in the clock in
+    Latency: a block accepted in clock 0 is prepared from clock 1 to n + 8 in registers of its own,
+    while the block before runs. It starts in clock n + 9 or, if that is later, in the clock in
     which the last step of the block before is taken. Its first step is there two clocks later.
     ``done`` follows the last step by a clock.
 
     Throughput: a step a clock, and one clock more for every change of the frame: 8 in a whole
     ellipse. Between the last step of a block and the first one of the next lies one clock, if the
-    next was accepted n + 10 clocks or more before that last step was taken; the next block is
+    next was accepted n + 9 clocks or more before that last step was taken; the next block is
     accepted from the clock after a block's start on. Behind a block of fewer clocks the rest of
     the preparation is waited for: up to n + 11 clocks in all.
 
@@ -96,9 +96,10 @@ class ExactConic(Part):
     clock, in place of ``done``, when both derivatives are 0 at the start or \|Gx\| + \|Gy\| <
     4·(\|A\| + \|B\| + \|C\|). Nothing moves and the next block runs as ever.
 
-    Error bound: ½ step along v while the slope stays from 0 to 1 within a step, so ½ step; measured
-    over random curves it is 0.5000 where the radius of curvature is 3.5 steps or more, and up to
-    0.70 where it is 2, since the first step of a frame is not checked. See docs/exact_conic.md.
+    Error bound: ½ step. Of the points on the line u = 1 the nearest one is taken, as long as the
+    curve passes each such line once in a frame; measured over random curves with radii of
+    curvature down to 2 steps it is 0.5000. An end that is off the curve has that much of an error
+    itself. See docs/exact_conic.md.
 
     Source: design, section 6.9 (the faster axis steps, the sign of the residual decides the other
     one); the middle as the place of the residual, frames, end and preparation are ours.
@@ -325,9 +326,7 @@ class ExactConic(Part):
         m.d.comb += [
             self.near.eq((self.turns < 2) & close[0] & close[1]),
             self.missed.eq((self.turns == 0) & ~self.near & (passed[0] | passed[1])),
-            self.outside.eq(
-                (edge[0] | edge[1]) & ~(self.near | self.missed | self.turning)
-            ),
+            self.outside.eq((edge[0] | edge[1]) & ~(self.near | self.missed | self.turning)),
             self.goes.eq(~(self.near | self.missed | self.turning | self.outside)),
             out.clock.eq(uu.clock),
             out.taken.eq(uu.taken),
@@ -343,7 +342,7 @@ class ExactConic(Part):
                 m.d.sync += self.late.eq(ErrorCode.RANGE)
 
     def _sum(self, m: Module) -> None:
-        """Add up the residuals and what belongs to them, for a step or for a change of the frame."""
+        """Add up the residuals and what belongs to them, for a step or a change of the frame."""
         residual, outer, axial, across = self.residual, self.outer, self.axial, self.across
         alpha, beta, gamma = self.alpha, self.beta, self.gamma
         slows, diagonal, turning = self.slows, self.diagonal, self.turning

@@ -76,9 +76,7 @@ class _Registers:
         leads = {"x": state["steep"] == 0, "y": state["steep"] == 1}
         self.moves = {
             a: z3.If(
-                z3.And(
-                    self.clock, state["turning"] == 0, z3.Or(leads[a], state["diagonal"] == 1)
-                ),
+                z3.And(self.clock, state["turning"] == 0, z3.Or(leads[a], state["diagonal"] == 1)),
                 where(state[f"direction_{a}"], self._number(-1), self._number(1)),
                 self._number(0),
             )
@@ -170,9 +168,7 @@ class _Registers:
             captured[name] = z3.If(multiplied, state[register], old[name])
         return old | captured
 
-    def _frame(
-        self, ghosts: dict, steep: Value, down_x: Value, down_y: Value
-    ) -> dict[str, Value]:
+    def _frame(self, ghosts: dict, steep: Value, down_x: Value, down_y: Value) -> dict[str, Value]:
         """Give the derivatives and the coefficients as they are seen along a piece."""
         x, y = (where(d, -ghosts[k], ghosts[k]) for k, d in (("X", down_x), ("Y", down_y)))
         return {
@@ -214,9 +210,7 @@ class _Registers:
 
     # --- what there is to say of a state
 
-    def summed(
-        self, state: dict, ghosts: dict, *, modular: bool = False
-    ) -> dict[str, z3.BoolRef]:
+    def summed(self, state: dict, ghosts: dict, *, modular: bool = False) -> dict[str, z3.BoolRef]:
         """State that the registers of the running block are what the curve says.
 
         With ``modular`` axial and across are meant in as many bits as they have.
@@ -291,9 +285,7 @@ class _Registers:
                 "empty": z3.Implies(
                     z3.Or(z3.And(held, tick > n + 3), done),
                     (state["next_empty"] == 1)
-                    == z3.And(
-                        *(state[name] == 0 for name in ("next_turns", "next_p3", "next_p4"))
-                    ),
+                    == z3.And(*(state[name] == 0 for name in ("next_turns", "next_p3", "next_p4"))),
                 ),
                 "extras": z3.Implies(
                     done,
@@ -384,7 +376,7 @@ class _Registers:
         names = ("steep", "slows", "turning", "diagonal", "direction_x", "direction_y")
         claims = {}
         for bits in product((0, 1), repeat=len(names)):
-            known = dict(zip(names, bits, strict=True))
+            known: dict[str, int] = dict(zip(names, bits, strict=True))
             here = state | {name: self._number(bit) for name, bit in known.items()}
             after = golden._summed(here, self._number(0), _keep)
             after |= {"running": self._number(1)}
@@ -459,7 +451,9 @@ class _Registers:
                 ),
             }
         kept = self._constants(state)
-        small = z3.And(state["beta"] <= 2 ** (self.width + 3), state["beta"] > -(2 ** (self.width + 4)))
+        small = z3.And(
+            state["beta"] <= 2 ** (self.width + 3), state["beta"] > -(2 ** (self.width + 4))
+        )
         claims |= {
             f"{name} anew": z3.Implies(small, after[name] == where(state["slows"], *kept[name]))
             for name in CHANGES
@@ -467,7 +461,9 @@ class _Registers:
         return claims
 
     def _frame_of(self, state: dict) -> dict[str, Value]:
-        return self._frame(self.ghosts, *(state[k] for k in ("steep", "direction_x", "direction_y")))
+        return self._frame(
+            self.ghosts, *(state[k] for k in ("steep", "direction_x", "direction_y"))
+        )
 
     def _half(self, state: dict) -> Value:
         """Give half of what axial is, rounded down."""
@@ -537,8 +533,7 @@ class _Registers:
                 {
                     "half": z3.Implies(
                         state["axial"]
-                        == 2 * self._half(state)
-                        + (self._frame_of(state)["beta"] & 1),
+                        == 2 * self._half(state) + (self._frame_of(state)["beta"] & 1),
                         state["axial"] >> 1 == self._half(state),
                     ),
                     "axial": 2 * self._half(state) + (self._frame_of(state)["beta"] & 1)
@@ -625,7 +620,9 @@ class _Registers:
             p = f"next_{a}"
             turned = z3.Extract(n, 0, state[p])
             claims |= {
-                f"{p}: begins": z3.Implies(self.accept, after[p] == self.inputs[f"blocks_start_{a}"]),
+                f"{p}: begins": z3.Implies(
+                    self.accept, after[p] == self.inputs[f"blocks_start_{a}"]
+                ),
                 f"{p}: turns": z3.Implies(
                     multiplies, z3.Extract(n, 0, after[p]) == z3.RotateLeft(turned, 1)
                 ),
@@ -832,9 +829,7 @@ class _Registers:
                         self.ends, z3.Xor(pulses, z3.Or(stepless, after["late"] != 0))
                     ),
                     "late": z3.Implies(after["late"] != 0, self.ends),
-                    "code": z3.Or(
-                        *(after["late"] == code for code in (0, RANGE, OFF_CURVE))
-                    ),
+                    "code": z3.Or(*(after["late"] == code for code in (0, RANGE, OFF_CURVE))),
                 },
             ),
             self.obligation(
@@ -858,7 +853,8 @@ class _Registers:
                         after["late"] == RANGE,
                         z3.Or(
                             *(
-                                state[p] == where(
+                                state[p]
+                                == where(
                                     state[f"direction_{a}"],
                                     self._number(-(2**self.width)),
                                     self._number(2**self.width - 1),
@@ -930,7 +926,8 @@ def _numbers(golden: ExactConic) -> list[Obligation]:
             "derivatives: P·X + Q·Y takes a bit of x and one of y as 2·(P·X + Q·Y) + P·bit + Q·bit",
             [],
             {
-                "bit": p * (2 * x + bit) + q * (2 * y + dy) == 2 * (p * x + q * y) + p * bit + q * dy,
+                "bit": p * (2 * x + bit) + q * (2 * y + dy)
+                == 2 * (p * x + q * y) + p * bit + q * dy,
                 "sign": z3.And(p * -bit == -(p * bit), q * -bit == -(q * bit)),
             },
             True,
@@ -967,7 +964,8 @@ def _numbers(golden: ExactConic) -> list[Obligation]:
         ),
         Obligation(
             "it always ends: within a frame there is a clock for each step of room at most, a wait "
-            "and a change, and two frames to a turn: fewer than (turns + 1)·2·(2^(n + 2) + 2) clocks",
+            "and a change, and two frames to a turn: fewer than 2·(turns + 1)·(2^(n + 2) + 2) "
+            "clocks",
             [
                 *(turns >= 0, room >= 0, room < 2 ** (n + 2)),
                 steps <= 2 * (turns + 1) * (room + 2),

@@ -99,7 +99,7 @@ def test_clocks_of_a_quarter_by_hand():
     taken = seen.events[column(seen.events, "taken") == 1]
     first = taken[:7]
     assert first[0, 0] == preparation_clocks(4) + 2
-    points = (np.cumsum(first[:, 5:7], axis=0) + (5, 0)).tolist()
+    points = (np.cumsum(first[:, 5:7], axis=0) + np.array([5, 0])).tolist()
     # Of (4, 3) and (3, 4) both lie on the circle; between them is the change of the frame.
     assert points == [[5, 1], [5, 2], [4, 3], [3, 4], [2, 5], [1, 5], [0, 5]]
     assert sorted(np.diff(first[:, 0]).tolist()) == [1, 1, 1, 1, 1, 2]
@@ -134,7 +134,7 @@ def test_a_step_every_clock_but_for_changes_of_the_frame():
 
 
 def test_the_path_is_the_same_however_long_a_step_waits():
-    blocks = [block for block in draw_conics(4, 16, seed=6, turns=4).tolist()]
+    blocks = draw_conics(4, 16, seed=6, turns=4).tolist()
     free, held = run(blocks, 4), run(blocks, 4, Stalls(7, stall=0.7))
     moves = [it.events[column(it.events, "taken") == 1][:, 5:8] for it in (free, held)]
     assert np.array_equal(moves[0], moves[1])
@@ -142,7 +142,7 @@ def test_the_path_is_the_same_however_long_a_step_waits():
 
 
 def test_every_block_is_answered_and_ends_on_its_end():
-    blocks = [block for block in draw_conics(4, 40, seed=8, turns=4).tolist()]
+    blocks = draw_conics(4, 40, seed=8, turns=4).tolist()
     seen = run(blocks, 4)
     answered = (column(seen.events, "done") | column(seen.events, "error")) != 0
     answers = seen.events[answered]
@@ -171,7 +171,7 @@ def test_a_block_that_misses_its_end_is_ended_late_and_the_next_runs(blocks, cod
         taken = seen.events[column(seen.events, "taken") == 1]
         before = taken[taken[:, 0] <= answers[0, 0]]
         assert not before[:, 7].any()
-        assert (taken[len(before) :, 5:7].sum(axis=0) + (5, 0)).tolist() == [0, 5]
+        assert taken[len(before) :, 5:7].sum(axis=0).tolist() == [-5, 5]
         assert taken[-1, 7] == 1
 
 
@@ -187,7 +187,7 @@ def amended(core: ExactConic, change: Callable[[Module], None]) -> ExactConic:
         change(m)
         return m
 
-    core.elaborate = elaborate  # pyright: ignore[reportAttributeAccessIssue]
+    core.elaborate = elaborate
     return core
 
 

@@ -39,7 +39,9 @@ def test_no_point_of_the_fractions_is_farther_than_the_bound(axes):
 
 @pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 def test_settings_give_every_choice_a_value_that_is_surveyed(method):
-    assert method.settings.keys() == {"default", "lecture"}
+    # What is ours alone has no machine of the documents.
+    exact = method.name.startswith("exact_")
+    assert method.settings.keys() == {"default", *(() if exact else ("lecture",))}
     for setting in method.settings.values():
         assert setting.keys() == method.choices.keys()
         assert all(value in method.choices[name] for name, value in setting.items())
@@ -117,6 +119,8 @@ def timed_blocks(method, golden, count):
 def test_no_block_takes_more_clocks_than_it_may(name, setting):
     """And the limit is no more than a few times too high: a dead core is soon given up."""
     method = METHODS[name]
+    if setting not in method.settings:
+        pytest.skip(f"{name} has no setting {setting}")
     choices = method.settings[setting]
     golden = method.model(6, **choices)
     blocks = timed_blocks(method, golden, 8) if method.timed else BLOCKS[method.curve]

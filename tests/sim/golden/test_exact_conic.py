@@ -24,7 +24,7 @@ def follow(blocks, width, stop=20_000):
     given = {f"blocks_{name}": row for name, row in zip(FIELDS, blocks.T, strict=True)}
     points = [[tuple(block[5:7])] for block in blocks.tolist()]
     lasts = [[] for _ in blocks]
-    answers: list[tuple[int, int] | None] = [None] * len(blocks)
+    answers: list[tuple[int, ...]] = [()] * len(blocks)
     seen = [[] for _ in blocks]
     names = ("residual", "p1", "p2", "steep", "direction_x", "direction_y")
     for clock in range(stop):
@@ -127,7 +127,9 @@ def test_a_block_always_ends_whatever_it_is():
     points, lasts, answers, _ = follow(blocks, 4)
     codes = {code for _, code in answers}
     assert codes == {0, 1, 2, 3}
-    for block, path, last, (done, code) in zip(blocks.tolist(), points, lasts, answers, strict=True):
+    for block, path, last, (done, code) in zip(
+        blocks.tolist(), points, lasts, answers, strict=True
+    ):
         assert np.abs(np.array(path) + 0.5).max() <= 16
         if code == 3:
             assert len(path) == 1
@@ -187,9 +189,9 @@ def test_derivatives_are_those_at_the_start(point):
     for clock in range(golden.last_tick + 1):
         state = golden.step(state, given | {"blocks_valid": int(clock == 0), "steps_ready": 0})
     assert state["prepared"] == 1
-    # y leads, x slows not yet: it falls from standing still. g = 0, h = −10, F(1, ½) = −4 + 1/4 + 0.
+    # y leads and x speeds up, from standing still: g = 0, h = −10, F(1, ½) = 4.5² + 1² − 5².
     assert (state["next_steep"], state["next_slows"]) == (1, 0)
-    assert state["next_residual"] == 2 * 0 - 10 + 2 * 1 + 0 + 0
+    assert state["next_residual"] == -8
     assert (state["gx"], state["gy"]) == (6, -10 + 2)
 
 
