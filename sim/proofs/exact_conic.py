@@ -240,8 +240,13 @@ class _Registers:
         running = state["running"] == 1
         return {name: z3.Implies(running, fact) for name, fact in facts.items()}
 
-    def prepared(self, state: dict, ghosts: dict) -> dict[str, z3.BoolRef]:
-        """State what is known of a block that is prepared, tick by tick."""
+    def prepared(
+        self, state: dict, ghosts: dict, *, modular: bool = False
+    ) -> dict[str, z3.BoolRef]:
+        """State what is known of a block that is prepared, tick by tick.
+
+        With ``modular`` the constants of its first frame are meant in as many bits as they have.
+        """
         n, tick, held = self.width, state["tick"], state["held"] == 1
         last = self.golden.last_tick
         directions = (state[f"next_down_{a}"] for a in "xy")
@@ -257,6 +262,10 @@ class _Registers:
 
         done = state["prepared"] == 1
         extras = self._extras(frame)
+        pairs = [
+            (k, state[k], where(slows, *extras[name])) for k, name in zip("de", EXTRAS, strict=True)
+        ]
+        same = self._is if modular else lambda _, register, value: register == value
         turned = z3.Or(z3.And(held, tick > n + 5), done)
         axial, across = 2 * g + 6 * alpha + beta, h + 2 * beta + 2 * gamma
         way = {
@@ -287,13 +296,7 @@ class _Registers:
                     (state["next_empty"] == 1)
                     == z3.And(*(state[name] == 0 for name in ("next_turns", "next_p3", "next_p4"))),
                 ),
-                "extras": z3.Implies(
-                    done,
-                    z3.And(
-                        state["d"] == where(slows, *extras["outer_straight"]),
-                        state["e"] == where(slows, *extras["outer_aslant"]),
-                    ),
-                ),
+                "extras": z3.Implies(done, z3.And(*(same(*it) for it in pairs))),
                 "fault": z3.Or(state["fault"] == 0, state["fault"] == SHARP),
                 "no fault yet": z3.Implies(z3.And(tick > 0, tick < n + 8), state["fault"] == 0),
                 "coefficients": z3.Implies(z3.And(held, tick > 0, tick < n + 6), raw),
@@ -474,14 +477,26 @@ class _Registers:
         """Split what is claimed of a preparation by the clock, and by the frame if it is known."""
         state, n = self.state, self.width
         names = ("next_steep", "next_slows", "next_down_x", "next_down_y")
-        claims = {}
+        claims = {
+            "there are no other cases": z3.Or(
+                z3.And(state["held"] == 0, state["prepared"] == 0, state["tick"] == 0),
+                z3.And(state["held"] == 1, state["prepared"] == 1, state["tick"] == 0),
+                z3.And(state["held"] == 1, state["prepared"] == 0, state["tick"] > 0),
+            )
+        }
         for name, fact in facts.items():
-            rest = z3.Or(state["tick"] < n + 5, state["held"] == 0)
-            claims[f"{name} before"] = z3.Implies(rest, fact)
+            for words, held, prepared, tick in (
+                ("without a block", 0, 0, state["tick"] == 0),
+                ("when prepared", 1, 1, state["tick"] == 0),
+                ("before", 1, 0, z3.And(state["tick"] > 0, state["tick"] < n + 5)),
+            ):
+                case = (state["held"] == held, state["prepared"] == prepared, tick)
+                claims[f"{name} {words}"] = z3.Implies(z3.And(*case), fact)
             for tick in range(n + 5, n + 9):
                 for bits in product((0, 1), repeat=len(names)):
                     case = [state[k] == bit for k, bit in zip(names, bits, strict=True)]
-                    now = z3.And(state["tick"] == tick, state["held"] == 1, *case)
+                    case += [state["held"] == 1, state["prepared"] == 0]
+                    now = z3.And(state["tick"] == tick, *case)
                     words = "".join(map(str, bits))
                     claims[f"{name} {tick} {words}"] = z3.Implies(now, fact)
         return claims
@@ -507,8 +522,8 @@ class _Registers:
                 self._cases(),
             ),
             self.obligation(
-                "residuals: axial and across are what they are in their own bits, since neither "
-                "these nor what they stand for can be more",
+                "residuals: axial, across and the constants of the first frame are what they are "
+                "in their own bits, since neither these nor what they stand for can be more",
                 [
                     z3.And(value >= -(2 ** (bits - 1)), value < 2 ** (bits - 1))
                     for value, bits in (
@@ -517,6 +532,11 @@ class _Registers:
                     )
                 ],
                 {
+                    **{
+                        f"{k}: {name}": z3.Implies(self._is(k, state[k], value), state[k] == value)
+                        for k, name in zip("de", EXTRAS, strict=True)
+                        for value in self._extras(state)[name]
+                    },
                     "axial": z3.Implies(
                         self._is("axial", state["axial"], self.ghosts["F"]),
                         state["axial"] == self.ghosts["F"],
@@ -552,7 +572,7 @@ class _Registers:
                 "preparation: from the derivatives at the start to the frame, its sums and the "
                 "residuals of the start, where F = 0",
                 prepared,
-                self._ticks(self.prepared(after, self.next_ghosts_after)),
+                self._ticks(self.prepared(after, self.next_ghosts_after, modular=True)),
             ),
             self.obligation(
                 "place: P3 and P4 are the way to the end, P1 and P2 the position with the step "
