@@ -7,6 +7,7 @@ they are where the blocks say. The RTL is proven equal to the golden model.
 
 import sys
 
+import click
 import numpy as np
 
 from discreta.sim import conics
@@ -64,8 +65,8 @@ def measure(blocks: np.ndarray, width: int) -> tuple[np.ndarray, int, int, int]:
 def main() -> None:
     """Print the table."""
     width, count = int(sys.argv[1]), int(sys.argv[2])
-    print("| curves | largest error | above 0.5 | ends reached | clocks per step |")
-    print("|---|---|---|---|---|")
+    click.echo("| curves | largest error | above 0.5 | ends reached | clocks per step |")
+    click.echo("|---|---|---|---|---|")
     for kind in (*conics.KINDS, "whole ellipse"):
         if kind == "whole ellipse":
             blocks = ellipses(width, min(count, 400))
@@ -75,7 +76,7 @@ def main() -> None:
         above = int((errors > 0.5 + 1e-9).sum())
         title = f"{len(blocks)} {kind}s of {width} bits"
         ends = f"{reached} of {len(blocks)}"
-        print(f"| {title} | {errors.max():.4f} | {above} | {ends} | {clocks / steps:.4f} |")
+        click.echo(f"| {title} | {errors.max():.4f} | {above} | {ends} | {clocks / steps:.4f} |")
 
 
 if __name__ == "__main__":
