@@ -310,7 +310,7 @@ def _random_arcs(width: int, count: int) -> np.ndarray:
 
 
 def _conic_groups(method: Method, width: int) -> list[Group]:
-    guard = max(method.choices["guard"])
+    guard = max(method.choices.get("guard", (0,)))
     # A summation moves the faster axis by half of 2^−guard at least.
     _room(width, f"curve of {1 << width} steps", lambda width: 2 << (width + guard))
     groups = []

@@ -21,6 +21,7 @@ from discreta.hdl.conic import Conic
 from discreta.hdl.contract import MAX_WIDTH, Part
 from discreta.hdl.exact_arc import ExactArc
 from discreta.hdl.exact_line import ExactLine
+from discreta.hdl.exact_conic import ExactConic
 from discreta.hdl.linear import Linear
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
 from discreta.hdl.two_stage import two_stage_circular, two_stage_linear
@@ -33,6 +34,7 @@ from discreta.sim.golden.comparison import Comparison as GoldenComparison
 from discreta.sim.golden.conic import Conic as GoldenConic
 from discreta.sim.golden.exact_arc import ExactArc as GoldenExactArc
 from discreta.sim.golden.exact_line import ExactLine as GoldenExactLine
+from discreta.sim.golden.exact_conic import ExactConic as GoldenExactConic
 from discreta.sim.golden.linear import Linear as GoldenLinear
 from discreta.sim.golden.two_stage import TwoStage as GoldenTwoStage
 from discreta.sim.golden.two_stage import two_stage_circular as golden_two_stage_circular
@@ -235,6 +237,17 @@ def _conic_clocks(golden: GoldenConic, blocks: np.ndarray) -> np.ndarray:
     return clocks.astype(np.int64) + pieces + golden.width + 10
 
 
+def _exact_conic_clocks(golden: GoldenExactConic, blocks: np.ndarray) -> np.ndarray:
+    """One for every step and every change of the frame, the preparation, and what stands around."""
+    pieces = 1 + blocks[:, 10]
+    steps = motion(blocks).steps
+    # A frame may have a step more than its curve is long, and there are two to a piece. Whatever a
+    # block is: in a piece each axis goes one way, and no farther than the coordinates.
+    most = (pieces * 2.0 ** (golden.width + 2)).astype(np.int64)
+    steps = np.where(steps >= 0, np.fmin(np.ceil(np.nan_to_num(steps)), most), most)
+    return steps.astype(np.int64) + 4 * pieces + golden.width + 14
+
+
 #: Clocks that stand around a block on a carrier, beside its preparation and its periods.
 _AROUND = 8
 
@@ -428,6 +441,21 @@ METHODS = {
             },
             clocks=_conic_clocks,
             bound=lambda _: None,
+            max_width=CONIC_MAX_WIDTH,
+        ),
+        Method(
+            name="exact_conic",
+            curve="conic",
+            summary="any curve of the second order through its nearest points, by its residual",
+            error_bound="0.5; measured",
+            clocks_per_step="1, and 1 for each of the 8 octants of a turn",
+            device=ExactConic,
+            golden=GoldenExactConic,
+            choices={},
+            settings={"default": {}},
+            clocks=_exact_conic_clocks,
+            bound=lambda _: None,
+            exact=True,
             max_width=CONIC_MAX_WIDTH,
         ),
         Method(

@@ -310,6 +310,21 @@ class _Conics:
         return f"{curve}{' cw' if block[9] else ''}{turns}", say_point(point)
 
 
+class _ExactConics(_Conics):
+    """Curves of the second order whose faster axis steps every clock."""
+
+    watch: tuple[str, ...] = ("running",)
+    cost: int = 1
+
+    def clocks(self, method: Method, golden: Any, group: Group) -> np.ndarray:
+        """Give the most clocks that they can take, and few take fewer."""
+        return method.clocks(golden, group.blocks)
+
+    def completing(self, seen: dict[str, np.ndarray]) -> np.ndarray:
+        """Tell that they have no completing steps."""
+        return np.zeros(len(seen["running"]), dtype=bool)
+
+
 _CURVES: dict[tuple[str, bool], _Curve] = {
     ("line", False): _Lines(),
     ("arc", False): _Arcs(),
@@ -319,12 +334,13 @@ _CURVES: dict[tuple[str, bool], _Curve] = {
 }
 
 
-_EXACT_ARCS = _ExactArcs()
+#: Those of the exact methods, whose registers are not those of the others.
+_EXACT: dict[str, _Curve] = {"arc": _ExactArcs(), "conic": _ExactConics()}
 
 
 def _curve(method: Method) -> _Curve:
-    exact = method.exact and method.curve == "arc"
-    return _EXACT_ARCS if exact else _CURVES[method.curve, method.timed]
+    exact = _EXACT.get(method.curve) if method.exact else None
+    return exact or _CURVES[method.curve, method.timed]
 
 
 def say_worst(method: Method, group: Group, row: SurveyRow) -> tuple[str, str]:
