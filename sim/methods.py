@@ -20,8 +20,8 @@ from discreta.hdl.conic import ORDERS as CONIC_ORDERS
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import MAX_WIDTH, Part
 from discreta.hdl.exact_arc import ExactArc
-from discreta.hdl.exact_line import ExactLine
 from discreta.hdl.exact_conic import ExactConic
+from discreta.hdl.exact_line import ExactLine
 from discreta.hdl.linear import Linear
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
 from discreta.hdl.two_stage import two_stage_circular, two_stage_linear
@@ -33,8 +33,8 @@ from discreta.sim.golden.circular import Circular as GoldenCircular
 from discreta.sim.golden.comparison import Comparison as GoldenComparison
 from discreta.sim.golden.conic import Conic as GoldenConic
 from discreta.sim.golden.exact_arc import ExactArc as GoldenExactArc
-from discreta.sim.golden.exact_line import ExactLine as GoldenExactLine
 from discreta.sim.golden.exact_conic import ExactConic as GoldenExactConic
+from discreta.sim.golden.exact_line import ExactLine as GoldenExactLine
 from discreta.sim.golden.linear import Linear as GoldenLinear
 from discreta.sim.golden.two_stage import TwoStage as GoldenTwoStage
 from discreta.sim.golden.two_stage import two_stage_circular as golden_two_stage_circular
