@@ -112,7 +112,9 @@ SOUND = [
         "nothing: as in the lecture's block diagram",
         options=METHODS["circular"].settings["lecture"],
     ),
+    Variant(METHODS["exact_line"], "sound exact line", "nothing"),
     Variant(METHODS["exact_arc"], "sound exact arc", "nothing"),
+    Variant(METHODS["exact_conic"], "sound exact conic", "nothing"),
     Variant(METHODS["conic"], "sound conic", "nothing: the default setting"),
     Variant(
         METHODS["conic"],
