@@ -60,7 +60,14 @@ from discreta.sim.points import (
 )
 from discreta.sim.run import run, say_choices
 from discreta.sim.simulate import ENGINES, DeadCoreError, default_engine
-from discreta.sim.synth import DEVICES, RUNS, Measurement, SynthesisError, measure
+from discreta.sim.synth import (
+    DEVICES,
+    RUNS,
+    Measurement,
+    SynthesisError,
+    check_tools,
+    measure,
+)
 
 __all__ = ["main"]
 
@@ -805,6 +812,7 @@ def synth_command(
         file = None if json_file is None else outputs.open(json_file)
         show(0, len(makers) * RUNS)
         try:
+            check_tools(device)
             rows = [measure(make(), device, workers=workers, progress=progress) for make in makers]
         except ModuleNotFoundError as error:
             raise BadInputError(
@@ -852,7 +860,7 @@ def _print_measurements(title: str, rows: list[tuple[str, Measurement]], *, err:
 
 
 @cli.command("compare", short_help="All methods side by side: error, pace, cells, clock.")
-@click.argument("methods", type=_MethodName(), nargs=-1, metavar="[METHOD]...")
+@click.argument("methods", type=_MethodName(), nargs=-1, metavar="[METHOD...]")
 @_width
 @click.option(
     "--device",

@@ -8,7 +8,7 @@ from discreta.sim.groups import survey_groups
 from discreta.sim.methods import METHODS
 from discreta.sim.speed import limits
 from discreta.sim.survey import SurveyRow, survey
-from discreta.sim.synth import RUNS, SEEDS, Measurement, measure
+from discreta.sim.synth import RUNS, SEEDS, Measurement, check_tools, measure
 
 __all__ = ["PASSES", "SURVEY_WIDTH", "ComparisonRow", "compare"]
 
@@ -87,12 +87,12 @@ def compare(
     RuntimeError
         There is no C++ compiler.
     """
+    check_tools(device)
     workers = min(2, os.cpu_count() or 1)
     for name in names:
         method = METHODS[name]
         choices = method.settings["default"]
         bits = min(width, method.max_width)
-        # First what may be missing.
         core = method.core(bits, **choices)
         cells = measure(core, device, seeds, workers=workers, progress=progress)
         found = SurveyRow(choices, 0)

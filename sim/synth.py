@@ -43,6 +43,7 @@ __all__ = [
     "Fpga",
     "Measurement",
     "SynthesisError",
+    "check_tools",
     "measure",
 ]
 
@@ -261,6 +262,16 @@ class Measurement:
         return self.median / limit.median
 
 
+def check_tools(device: str) -> None:
+    """Raise :class:`ModuleNotFoundError` if Yosys or nextpnr is not there for one of the devices.
+
+    To be asked before a core is made, as one that is made must be used.
+    """
+    for needed in ("pyosys", f"yowasp_nextpnr_{DEVICES[device].place}"):
+        if find_spec(needed) is None:
+            raise ModuleNotFoundError(f"no module named {needed!r}", name=needed)
+
+
 def measure(
     core: Part,
     device: str = "hx8k",
@@ -297,9 +308,7 @@ def measure(
     fpga, seeds = DEVICES[device], tuple(seeds)
     if not seeds:
         raise ValueError("seeds are none: give one or more whole numbers")
-    for needed in ("pyosys", f"yowasp_nextpnr_{fpga.place}"):
-        if find_spec(needed) is None:
-            raise ModuleNotFoundError(f"no module named {needed!r}", name=needed)
+    check_tools(device)
     top = core if isinstance(core, PlainPorts) else PlainPorts(core)
     harness = Harness(top)
     pins = [harness.domain.clk, harness.d, harness.q]

@@ -155,7 +155,7 @@ def test_points_without_room_are_refused():
 
 def test_a_method_draws_its_own_curves_alone():
     with pytest.raises(
-        BadInputError, match=r"^method circular draws arcs and no lines: choose lin"
+        BadInputError, match=r"^method circular draws arcs and no lines: choose exact_line or lin"
     ):
         run(Polyline(POINTS), CIRCULAR)
     with pytest.raises(BadInputError, match=r"^method linear draws lines and no arcs: choose circ"):
