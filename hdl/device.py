@@ -3,18 +3,21 @@
 """The whole device: blocks in, motor pulses out, at the programmed speed."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from amaranth import Module, ResetInserter, Signal
 from amaranth.hdl import Value
 from amaranth.lib import stream
 from amaranth.lib.wiring import In, Out
 
+from discreta.hdl.constant_speed import ConstantSpeed, constant_arc, constant_line
 from discreta.hdl.contract import Part, per_axis, point_layout
+from discreta.hdl.exact_conic import ExactConic
 from discreta.hdl.feed import ACCELERATION_BITS, OVERRIDE_BITS, FeedUnit
 from discreta.hdl.pulse import TIMING_BITS, PulseUnit
 from discreta.hdl.queue import KINDS, BlockQueue, StopReason
 
-__all__ = ["Device"]
+__all__ = ["Device", "exact_device"]
 
 _TIMINGS = ("pulse_length", "pulse_space", "direction_setup", "direction_hold")
 
@@ -58,7 +61,9 @@ class Device(Part):
     one is refused or the device stops.
 
     Reset: nothing queued, standing at the origin. Overflow: none that its parts do not have.
-    Error bound: that of the interpolators. Speed: that of the feed unit.
+    Error bound: that of the interpolators. Speed: that of the feed unit; of lines and arcs that
+    come in ticks, those of :class:`~discreta.hdl.constant_speed.ConstantSpeed`, it is constant
+    along the path.
 
     Source: exercise 3, figure 3.3 (interpolator, БЗС, output device). Stops, limits and pulses are
     ours.
@@ -66,7 +71,7 @@ class Device(Part):
     Parameters
     ----------
     line, arc, conic : Part or None
-        The interpolators, of the same width and number of axes, untimed; at least one.
+        The interpolators, of the same width and number of axes, without a carrier; at least one.
     depth : int
         Blocks that the queue holds, 1 to 4096.
     pauses, pairing
@@ -114,7 +119,11 @@ class Device(Part):
         width, axes = _shared(self.interpolators)
         self.width = width
         self.axes = axes
-        self.queue = BlockQueue(width, axes, tuple(self.interpolators), depth)
+        layouts = {kind: part.blocks.payload.shape() for kind, part in self.interpolators.items()}
+        steady = [
+            kind for kind, part in self.interpolators.items() if isinstance(part, ConstantSpeed)
+        ]
+        self.queue = BlockQueue(width, axes, layouts, depth, steady=steady)
         self.feed = FeedUnit(axes, pauses=pauses, pairing=pairing)
         self.pulse = PulseUnit(
             width,
@@ -187,6 +196,8 @@ class Device(Part):
         m.submodules.pulse = pulse
         for kind, part in self.interpolators.items():
             m.submodules[kind] = ResetInserter(stands)(part)
+            if part.restart is not None:
+                m.d.comb += part.restart.eq(stands)
             offered, steps = getattr(queue, f"{kind}_blocks"), getattr(queue, f"{kind}_steps")
             m.d.comb += [
                 part.blocks.payload.eq(offered.payload),
@@ -218,6 +229,7 @@ class Device(Part):
             feed.feed.eq(queue.feed),
             feed.ahead.eq(queue.ahead),
             feed.taken.eq(queue.taken),
+            feed.even.eq(queue.even),
             feed.override.eq(self.override),
             feed.acceleration.eq(self.acceleration),
             feed.hold.eq(self.hold | self.stop_asked),
@@ -251,6 +263,42 @@ class Device(Part):
         with m.Elif(self.stop_asked & feed.still & ~queue.taken & ~pulse.busy):
             m.d.sync += reason.eq(StopReason.STOP)
         return m
+
+
+def exact_device(
+    width: int = 16, axes: int = 2, kinds: Sequence[str] = ("line", "arc"), **choices: Any
+) -> Device:
+    """Make a device with the exact interpolators, lines and arcs at constant speed.
+
+    Parameters
+    ----------
+    width : int
+        n, 4 to 32, with conics to 16.
+    axes : int
+        2 to 6; with conics 2. Beyond two axes an arc lies in x and y and the others move along it.
+    kinds : sequence of str
+        Which interpolators it has: of ``"line"``, ``"arc"``, ``"conic"``.
+    choices
+        Further parameters of :class:`Device`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        A parameter is not one of the above.
+    """
+    unknown = [kind for kind in kinds if kind not in KINDS]
+    if unknown or not kinds:
+        raise ValueError(f"kinds are {tuple(kinds)!r}: choose one or more of {', '.join(KINDS)}")
+    parts: dict[str, Part] = {}
+    if "line" in kinds:
+        parts["line"] = constant_line(width, axes)
+    if "arc" in kinds:
+        parts["arc"] = constant_arc(width, axes)
+    if "conic" in kinds:
+        if axes != 2:
+            raise ValueError(f"number of axes is {axes!r}: conics lie in a plane, choose 2")
+        parts["conic"] = ExactConic(width)
+    return Device(**parts, **choices)
 
 
 def _shared(interpolators: dict[str, Part]) -> tuple[int, int]:

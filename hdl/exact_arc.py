@@ -407,6 +407,7 @@ class ExactArc(Part):
         self.load_diagonal = Signal(way_shape, reset_less=True)
         self.load_past = {a: Signal(way_shape, name=f"load_past_{a}") for a in "xy"}
         self.load_end = {a: Signal(end_shape, name=f"load_end_{a}") for a in "xy"}
+        self.restart = Signal()
         #: 1 in the clock in which the next step is decided and nothing keeps it.
         self.entering = Signal()
 
@@ -453,7 +454,7 @@ class ExactArc(Part):
         )
         to_second = self.to_second
         # What is set to a constant, too, is reset with that: it spares gates.
-        rst = ResetSignal()
+        rst = ResetSignal() | self.restart
         moves = self.loading | (self.running & ~frozen)
         prepares, changes = self.mode[1], self.mode == CHANGE
         # The sign of E is kept the other way round while X leads.

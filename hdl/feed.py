@@ -80,8 +80,11 @@ class FeedUnit(Part):
     With ``pairing`` a step on other axes than the ones before it belongs to the same move: x and
     then y is a diagonal in two halves, and the second half adds √2 − 1 only. Without it (as in the
     exercise) an interpolator that puts out x and y one after the other is up to 29 % too slow.
+    With ``even`` what is taken is a tick of an interpolator at constant speed: the pause is 1,
+    whatever it moves.
 
-    Single step: a rising edge of ``single`` under ``hold`` permits one step.
+    Single step: a rising edge of ``single`` under ``hold`` permits one step, and the ticks before
+    it that move nothing.
 
     Latency: F and ``override`` of clock t act on ``permit`` in clock t + 3 (product, target, rate),
     ``hold`` in t + 2; with an acceleration their ramp begins a clock later. ``single`` acts in the
@@ -98,7 +101,8 @@ class FeedUnit(Part):
 
     Error: F has 17 significant bits, to be chosen within 2^-17 of any speed from 2^-24 to 1, and is
     then exact to 2^-48 steps per clock. Along the path, over moves of any straight direction, the
-    speed is F within −7.61 % … +0.02 %: pauses measure the octagon, max + (√2 − 1)·min.
+    speed is F within −7.61 % … +0.02 %: pauses measure the octagon, max + (√2 − 1)·min. With
+    ``even`` it is that of the ticks.
 
     Source: exercise 3, figure 3.3 and extra task 2 (F, start pulses, pause of 1.4). Override, ramp
     and pairing are ours.
@@ -142,6 +146,7 @@ class FeedUnit(Part):
                 "feed": In(feed_layout()),
                 "ahead": In(AHEAD_BITS),
                 "taken": In(1),
+                "even": In(1),
                 "moves": In(per_axis(axes, 1)),
                 "override": In(OVERRIDE_BITS),
                 "acceleration": In(ACCELERATION_BITS),
@@ -195,7 +200,10 @@ class FeedUnit(Part):
         ]
         m.d.sync += [
             self.single_before.eq(self.single),
-            self.single_step.eq(self.hold & (rising | (self.single_step & ~self.taken))),
+            self.single_step.eq(
+                self.hold
+                & (rising | (self.single_step & ~(self.taken & self.moves.as_value().any())))
+            ),
         ]
         return m
 
@@ -274,7 +282,13 @@ class FeedUnit(Part):
             moves.eq(Cat(self.moves[a] for a in self.letters)),
             joins.eq(self.cell.any() & ~(self.cell & moves).any() if self.pairing else 0),
             together.eq(Mux(joins, self.cell | moves, moves)),
-            cost.eq(self._pause_of(together) - Mux(joins, self._pause_of(self.cell), 0)),
+            cost.eq(
+                Mux(
+                    self.even,
+                    1 << _PAUSE_FRACTION,
+                    self._pause_of(together) - Mux(joins, self._pause_of(self.cell), 0),
+                )
+            ),
         ]
         owed = Signal.like(self.debt, name="owed")
         m.d.comb += owed.eq(
@@ -283,7 +297,7 @@ class FeedUnit(Part):
         with m.If(self.taken):
             m.d.sync += [
                 self.debt.eq(Mux(owed < 0, 0, owed) - self.rate),
-                self.cell.eq(together),
+                self.cell.eq(Mux(self.even, 0, together)),
             ]
         with m.Elif(self.debt > 0):
             m.d.sync += self.debt.eq(self.debt - self.rate)

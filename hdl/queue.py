@@ -1,5 +1,6 @@
 """The block queue: blocks of any kind, one behind the other, through the right interpolator."""
 
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from amaranth import Cat, Module, Mux, ResetInserter, Signal
@@ -8,8 +9,6 @@ from amaranth.lib import data, enum, stream
 from amaranth.lib.fifo import SyncFIFOBuffered
 from amaranth.lib.wiring import In, Out
 
-from discreta.hdl.arc_input import arc_block_layout
-from discreta.hdl.conic import conic_block_layout
 from discreta.hdl.contract import (
     AXIS_LETTERS,
     ErrorCode,
@@ -21,7 +20,6 @@ from discreta.hdl.contract import (
     step_layout,
 )
 from discreta.hdl.feed import AHEAD_BITS, feed_layout
-from discreta.hdl.quadrant import line_block_layout
 
 __all__ = [
     "KINDS",
@@ -78,12 +76,14 @@ class StopReason(enum.Enum, shape=3):  # pyright: ignore[reportGeneralTypeIssues
 _REFUSED = 3
 
 
-def device_block_layout(width: int, axes: int, kinds: tuple[str, ...]) -> data.StructLayout:
+def device_block_layout(
+    width: int, axes: int, layouts: Mapping[str, data.StructLayout]
+) -> data.StructLayout:
     """Lay out a block of a device: its kind, speed and path ahead, and all that its kinds need.
 
     ``end`` is where it leads; it starts where the block before it ends. ``ahead``: steps of path
     from its start to the end of the chain of blocks. The other fields are those of the kinds' own
-    blocks; a line leaves them alone.
+    blocks, ``layouts`` by kind; what a block's kind has no use for is left alone.
     """
     fields: dict[str, object] = {
         "kind": BlockKind,
@@ -91,18 +91,10 @@ def device_block_layout(width: int, axes: int, kinds: tuple[str, ...]) -> data.S
         "ahead": AHEAD_BITS,
         "end": point_layout(width, axes),
     }
-    for kind in kinds:
-        own = _layouts(width, axes)[kind].members
+    for layout in layouts.values():
+        own = layout.members
         fields |= {name: shape for name, shape in own.items() if name not in ("start", "end")}
     return data.StructLayout(fields)
-
-
-def _layouts(width: int, axes: int) -> dict[str, data.StructLayout]:
-    """Give the layout of every interpolator's own blocks."""
-    layouts = {"line": line_block_layout(width, axes)}
-    if axes == 2:
-        layouts |= {"arc": arc_block_layout(width), "conic": conic_block_layout(width)}
-    return layouts
 
 
 class BlockQueue(Part):
@@ -143,11 +135,14 @@ class BlockQueue(Part):
     width : int
         n of all interpolators.
     axes : int
-        2 to 6; arcs and conics have 2.
-    kinds : tuple of str
-        Which interpolators there are: of ``"line"``, ``"arc"``, ``"conic"``.
+        2 to 6.
+    layouts : dict of str to StructLayout
+        How the blocks of every interpolator are laid out that there is, by its kind: ``"line"``,
+        ``"arc"``, ``"conic"``.
     depth : int
         Blocks that wait, 1 to 4096, those handed over aside.
+    steady : collection of str
+        The kinds whose steps come in ticks of equal length: ``even`` is 1 while one of them runs.
 
     Attributes
     ----------
@@ -163,19 +158,26 @@ class BlockQueue(Part):
     """
 
     def __init__(
-        self, width: int = 16, axes: int = 2, kinds: tuple[str, ...] = ("line",), depth: int = 16
+        self,
+        width: int,
+        axes: int,
+        layouts: Mapping[str, data.StructLayout],
+        depth: int = 16,
+        *,
+        steady: Collection[str] = (),
     ):
         check_width(width)
         check_axes(axes)
-        _check_kinds(kinds, axes)
+        kinds = tuple(layouts)
+        _check_kinds(kinds)
         _check_depth(depth)
         self.letters = AXIS_LETTERS[:axes]
         point = point_layout(width, axes)
-        layout = device_block_layout(width, axes, kinds)
+        layout = device_block_layout(width, axes, layouts)
         members = {"blocks": In(stream.Signature(layout))}
         for kind in kinds:
             members |= {
-                f"{kind}_blocks": Out(stream.Signature(_layouts(width, axes)[kind])),
+                f"{kind}_blocks": Out(stream.Signature(layouts[kind])),
                 f"{kind}_steps": In(stream.Signature(step_layout(axes))),
                 f"{kind}_done": In(1),
                 f"{kind}_error": In(ErrorCode),
@@ -190,6 +192,7 @@ class BlockQueue(Part):
                 "steps": Out(stream.Signature(per_axis(axes, signed(2)))),
                 "active": Out(1),
                 "begins": Out(1),
+                "even": Out(1),
                 "feed": Out(feed_layout()),
                 "ahead": Out(AHEAD_BITS),
                 "taken": Out(1),
@@ -203,6 +206,7 @@ class BlockQueue(Part):
         self.width = width
         self.axes = axes
         self.kinds = kinds
+        self.steady = tuple(kind for kind in kinds if kind in steady)
         self.depth = depth
         self.layout = layout
 
@@ -323,6 +327,7 @@ class BlockQueue(Part):
         m.d.comb += [
             self.taken.eq(self.steps.valid & self.steps.ready),
             self.active.eq(current["valid"]),
+            self.even.eq(Cat(current["kind"] == KINDS[kind].value for kind in self.steady).any()),
             self.feed.mantissa.eq(current["feed_mantissa"]),
             self.feed.exponent.eq(current["feed_exponent"]),
             self.ahead.eq(self.next_ahead),
@@ -414,13 +419,11 @@ def _leaf(view, path: tuple[str, ...]):
     return view
 
 
-def _check_kinds(kinds: tuple[str, ...], axes: int) -> None:
-    """Raise ``ValueError`` unless these are kinds that so many axes have."""
-    there_are = tuple(KINDS) if axes == 2 else ("line",)
-    if not kinds or len(set(kinds)) < len(kinds) or not set(kinds) <= set(there_are):
+def _check_kinds(kinds: tuple[str, ...]) -> None:
+    """Raise ``ValueError`` unless these are one or more of the kinds there are."""
+    if not kinds or not set(kinds) <= set(KINDS):
         raise ValueError(
-            f"kinds are {kinds!r}: choose one or more of {', '.join(map(repr, there_are))}"
-            + ("" if axes == 2 else f" for {axes} axes")
+            f"kinds are {kinds!r}: choose one or more of {', '.join(map(repr, KINDS))}"
         )
 
 

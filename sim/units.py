@@ -2,31 +2,23 @@
 
 from typing import Any
 
-from discreta.hdl.circular import Circular
 from discreta.hdl.conic import MAX_WIDTH as CONIC_MAX_WIDTH
-from discreta.hdl.conic import Conic
-from discreta.hdl.device import Device
+from discreta.hdl.constant_speed import constant_arc, constant_line
+from discreta.hdl.device import exact_device
 from discreta.hdl.feed import PAUSES, FeedUnit
-from discreta.hdl.linear import Linear
 from discreta.hdl.pulse import KINDS as PIN_KINDS
 from discreta.hdl.pulse import PulseUnit
+from discreta.sim.golden.constant_speed import constant_arc as golden_constant_arc
+from discreta.sim.golden.constant_speed import constant_line as golden_constant_line
 from discreta.sim.golden.device import make_device as golden_device
 from discreta.sim.golden.feed import FeedUnit as GoldenFeedUnit
 from discreta.sim.golden.pulse import PulseUnit as GoldenPulseUnit
 from discreta.sim.methods import Design
 
-__all__ = ["EXERCISE_PAUSES", "UNITS", "make_device"]
+__all__ = ["EXERCISE_PAUSES", "UNITS"]
 
 #: The exercise's own: 1.4 times as long after a step on both axes.
 EXERCISE_PAUSES = (256, 358)
-
-_INTERPOLATORS = {"line": Linear, "arc": Circular, "conic": Conic}
-
-
-def make_device(width: int, *, kinds: tuple[str, ...], depth: int, **choices: Any) -> Device:
-    """Make a device with the default interpolators of some kinds of curves."""
-    parts: dict[str, Any] = {kind: _INTERPOLATORS[kind](width) for kind in kinds}
-    return Device(**parts, depth=depth, **choices)
 
 
 def _golden_device(width: int, *, kinds: tuple[str, ...], depth: int) -> Any:
@@ -38,6 +30,26 @@ def _golden_device(width: int, *, kinds: tuple[str, ...], depth: int) -> Any:
 UNITS = {
     unit.name: unit
     for unit in (
+        Design(
+            name="constant_line",
+            summary="exact line at constant speed: its steps spread over ticks of equal length",
+            device=constant_line,
+            golden=golden_constant_line,
+            axes=(2, 3, 4, 5, 6),
+            choices={},
+            settings={"default": {}},
+            proofs="constant_speed",
+        ),
+        Design(
+            name="constant_arc",
+            summary="exact arc at constant speed, further axes linear along it",
+            device=constant_arc,
+            golden=golden_constant_arc,
+            axes=(2, 3, 4, 5, 6),
+            choices={},
+            settings={"default": {}},
+            proofs="constant_speed",
+        ),
         Design(
             name="feed",
             summary="start pulses at the programmed speed: override, ramp, hold, single step",
@@ -60,7 +72,7 @@ UNITS = {
         Design(
             name="device",
             summary="blocks in, pulses out: queue, interpolators, feed and pulse unit",
-            device=make_device,
+            device=lambda width, **choices: exact_device(width, **choices),
             golden=_golden_device,
             # What waits beyond one block is in a FIFO of the library.
             choices={"kinds": (("line",), ("line", "arc")), "depth": (1,)},

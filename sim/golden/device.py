@@ -12,10 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from discreta.sim.golden.circular import Circular
 from discreta.sim.golden.conic import Conic
+from discreta.sim.golden.constant_speed import ConstantSpeed, constant_arc, constant_line
+from discreta.sim.golden.exact_conic import ExactConic
 from discreta.sim.golden.feed import FeedUnit
-from discreta.sim.golden.linear import Linear
 from discreta.sim.golden.logic import Value, equal, negate, where
 from discreta.sim.golden.pulse import TIMINGS, PulseUnit
 from discreta.sim.golden.queue import BlockQueue
@@ -29,7 +29,11 @@ Tell = Callable[[str, Value], Value]
 STOP, EMERGENCY, LIMIT = 1, 2, 3
 
 #: The interpolators of a device that is made by its kinds.
-INTERPOLATORS: dict[str, Callable[[int], Any]] = {"line": Linear, "arc": Circular, "conic": Conic}
+INTERPOLATORS: dict[str, Callable[[int], Any]] = {
+    "line": constant_line,
+    "arc": constant_arc,
+    "conic": ExactConic,
+}
 
 #: Registers whose part calls them by the name of an input of the device.
 _RENAMED = {"hold": "pulse_hold"}
@@ -59,7 +63,9 @@ class Device:
     @property
     def queue(self) -> BlockQueue:
         """The block queue."""
-        return BlockQueue(self.width, self.axes, tuple(kind for kind, _ in self.interpolators))
+        kinds = tuple(kind for kind, _ in self.interpolators)
+        steady = tuple(kind for kind, part in self.interpolators if isinstance(part, ConstantSpeed))
+        return BlockQueue(self.width, self.axes, kinds, steady)
 
     @property
     def width(self) -> int:
@@ -172,11 +178,11 @@ class Device:
                 for name, value in queue.items()
                 if name.startswith((f"{kind}_blocks_", f"{kind}_steps_"))
             }
-            named = _named(tell, prefix) if isinstance(part, Conic) else ()
+            named = _named(tell, prefix) if isinstance(part, (Conic, ExactConic)) else ()
             later = part.step(self.part_state(state, kind, part), offered, *named)
             fresh = part.reset()
             after |= {prefix + name: where(stands, fresh[name], later[name]) for name in fresh}
-        feed_inputs = {name: queue[name] for name in ("active", "begins", "taken", "ahead")}
+        feed_inputs = {name: queue[name] for name in ("active", "begins", "taken", "even", "ahead")}
         feed_inputs |= {name: queue[name] for name in ("feed_mantissa", "feed_exponent")}
         feed_inputs |= {name: inputs[name] for name in ("override", "acceleration")}
         feed_inputs |= {

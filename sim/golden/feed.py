@@ -89,14 +89,17 @@ class FeedUnit:
         """Give the state after one clock.
 
         ``inputs``: ``active``, ``begins``, ``feed_mantissa``, ``feed_exponent``, ``ahead``,
-        ``taken``, ``moves_x``, ``moves_y`` …, ``override``, ``acceleration``, ``hold``, ``single``.
-        ``tell`` is told the name of every partial sum of the product, ``sum_1`` to ``sum_8``, and
+        ``taken``, ``even``, ``moves_x``, ``moves_y`` …, ``override``, ``acceleration``, ``hold``,
+        ``single``. ``tell`` is told the name of every partial sum of the product, ``sum_1`` to ``sum_8``, and
         gives what to go on with.
         """
         after = self._target(state, inputs, tell) | self._ramp(state, inputs)
         after |= self._pause(state, inputs)
         rises = inputs["single"] & negate(state["single_before"])
-        waits = state["single_step"] & negate(inputs["taken"])
+        moves: Value = 0
+        for a in self.letters:
+            moves = moves | inputs[f"moves_{a}"]
+        waits = state["single_step"] & negate(inputs["taken"] & moves)
         after["single_before"] = inputs["single"]
         after["single_step"] = inputs["hold"] & (rises | waits)
         return after
@@ -144,13 +147,15 @@ class FeedUnit:
 
     def _pause(self, state: State, inputs: dict[str, Value]) -> State:
         """Reckon what is left of the pause, and of the path."""
-        taken, cell = inputs["taken"], state["cell"]
+        taken, cell, even = inputs["taken"], state["cell"], inputs["even"]
         moves: Value = 0
         for place, a in enumerate(self.letters):
             moves = moves | inputs[f"moves_{a}"] << place
         joins = negate(equal(cell, 0)) & equal(cell & moves, 0) if self.pairing else 0 * moves
         together = where(joins, cell | moves, moves)
         cost = self._pause_of(together) - where(joins, self._pause_of(cell), 0)
+        # Ticks of an interpolator at constant speed are all as long.
+        cost = where(even, STEP, cost)
 
         debt, rate = state["debt"], state["rate"]
         owed = where(less(debt, 0), debt, 0) + (cost << 40)
@@ -160,7 +165,7 @@ class FeedUnit:
         ahead = where(equal(inputs["ahead"], 0), STEP, inputs["ahead"] << 8)
         return {
             "debt": where(taken, owed - rate, waited),
-            "cell": where(taken, together, cell),
+            "cell": where(taken, where(even, 0, together), cell),
             "to_go": where(inputs["begins"], ahead, where(taken, left, state["to_go"])),
         }
 

@@ -39,11 +39,14 @@ class BlockQueue:
         2 to 6.
     kinds : tuple of str
         Which interpolators there are: of ``"line"``, ``"arc"``, ``"conic"``.
+    steady : tuple of str
+        Those of them whose steps come in ticks of equal length.
     """
 
     width: int = 16
     axes: int = 2
     kinds: tuple[str, ...] = ("line",)
+    steady: tuple[str, ...] = ()
 
     @property
     def letters(self) -> str:
@@ -53,10 +56,13 @@ class BlockQueue:
     def own_fields(self, kind: str) -> dict[str, tuple[int, bool]]:
         """Give the fields that a kind of blocks has besides start and end: width and sign."""
         n = self.width
+        ticked = {"pace": (n + 13, False)} if kind in self.steady else {}
+        if ticked and kind == "arc" and self.axes > 2:
+            ticked["ticks"] = (n + 11, False)
         center = {f"center_{a}": (n + 1, True) for a in "xy"}
         return {
-            "line": {},
-            "arc": {**center, "clockwise": (1, False), "full_turns": (8, False)},
+            "line": ticked,
+            "arc": {**center, "clockwise": (1, False), "full_turns": (8, False), **ticked},
             "conic": {
                 **dict.fromkeys("abc", (n + 4, True)),
                 **dict.fromkeys("de", (2 * n + 5, True)),
@@ -123,6 +129,7 @@ class BlockQueue:
         out = {
             "blocks_ready": negate(state["head"]) & negate(flush),
             "active": state["current"],
+            "even": self._even(state),
             "feed_mantissa": state["current_feed_mantissa"],
             "feed_exponent": state["current_feed_exponent"],
             "ahead": state["next_ahead"],
@@ -206,6 +213,13 @@ class BlockQueue:
             last = self._runs(state, kind) & taken & inputs[f"{kind}_steps_last"]
             after[f"{kind}_ended"] = last & negate(flush)
         return after
+
+    def _even(self, state: State) -> Value:
+        """Tell whether the current block's steps come in ticks."""
+        even = 0 * state["current"]
+        for kind in self.steady:
+            even = even | equal(state["current_kind"], CODES[kind])
+        return even
 
     def _runs(self, state: State, kind: str) -> Value:
         """Tell whether the current block is of a kind, and still to be run."""
