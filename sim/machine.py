@@ -1,6 +1,6 @@
 """A curve on the whole device: blocks in, and what a virtual machine makes of the pins."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from hashlib import sha256
@@ -9,13 +9,17 @@ from typing import IO, Any
 
 import numpy as np
 
+from discreta.hdl.constant_speed import ConstantSpeed
 from discreta.hdl.contract import AXIS_LETTERS, Part
 from discreta.hdl.device import Device
+from discreta.hdl.exact_arc import ExactArc
+from discreta.hdl.exact_line import ExactLine
 from discreta.hdl.feed import FULL_OVERRIDE
 from discreta.hdl.plain import block_fields
 from discreta.hdl.pulse import TIMING_BITS
 from discreta.hdl.queue import KINDS, BlockKind, StopReason
 from discreta.sim.carrier import lengths
+from discreta.sim.constant_speed import paced, ticks_of
 from discreta.sim.curves import Curve
 from discreta.sim.feed import ahead, encode_acceleration, encode_feed, feed_of, octagon
 from discreta.sim.plotter import Pen, Plotter, PulseTiming, Screen
@@ -84,29 +88,29 @@ class Drive:
 
 
 def device_blocks(
-    fields: Iterable[str],
+    device: Device,
     curve: Curve,
-    own_fields: Iterable[str],
     drive: Drive,
 ) -> np.ndarray:
-    """Give what the device is given for a curve, shape (1 + blocks, block fields).
+    """Give what a device is given for a curve, shape (1 + blocks, block fields).
 
     The first block tells it where the machine stands: at the start of the curve.
-
-    Parameters
-    ----------
-    fields, own_fields : iterable of str
-        The fields of the device's blocks, and of those of the interpolator, as ports.
     """
-    columns = dict(zip(own_fields, curve.blocks.T, strict=True))
+    interpolator = device.interpolators[curve.kind]
+    if isinstance(interpolator, ConstantSpeed):
+        own = paced(curve.kind, curve.blocks, device.width, curve.axes)
+        path = ticks_of(curve.kind, curve.blocks, curve.axes)
+    else:
+        own, path = curve.blocks, octagon(curve.blocks, curve.kind)
+    columns = dict(zip(block_fields(interpolator), own.T, strict=True))
     mantissa, exponent = encode_feed(drive.feed)
     columns |= {
         "blocks_kind": np.full(len(curve.blocks), KINDS[curve.kind].value),
         "blocks_feed_mantissa": np.full(len(curve.blocks), mantissa),
         "blocks_feed_exponent": np.full(len(curve.blocks), exponent),
-        "blocks_ahead": ahead(octagon(curve.blocks, curve.kind)),
+        "blocks_ahead": ahead(path),
     }
-    fields = list(fields)
+    fields = block_fields(device)
     blocks = np.zeros((1 + len(curve.blocks), len(fields)), dtype=np.int64)
     for index, name in enumerate(fields):
         blocks[1:, index] = columns[name]
@@ -176,7 +180,7 @@ class Machine:
     ----------
     curve : Curve
     interpolator : Part
-        Of a method that draws such curves.
+        Of a method that draws such curves; an exact line or arc runs at constant speed here.
     drive : Drive
     expected : Trail
         The points of the interpolator alone.
@@ -195,12 +199,14 @@ class Machine:
     """
 
     def __init__(self, curve: Curve, interpolator: Part, drive: Drive, expected: Trail):
+        if isinstance(interpolator, (ExactLine, ExactArc)):
+            interpolator = ConstantSpeed(interpolator)
         self.device = Device(**{curve.kind: interpolator})
         self.plotter = Plotter(curve.start, drive.timing, keep_moves=False)
         self.pen = Pen(curve.start)
         self.screen = Screen(curve.start, expected.low, expected.high)
         self.clocks = 0
-        self._curve, self._interpolator, self._drive = curve, interpolator, drive
+        self._curve, self._drive = curve, drive
         self._expected, self._trail = expected, Trail(curve.start)
         self._accepted: int | None = None
         self._last = 0
@@ -211,9 +217,7 @@ class Machine:
         self, *, limit: int, engine: str, vcd: IO[str] | None = None
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Run the curve; give clocks, from the first block on, and points of the pins' moves."""
-        blocks = device_blocks(
-            block_fields(self.device), self._curve, block_fields(self._interpolator), self._drive
-        )
+        blocks = device_blocks(self.device, self._curve, self._drive)
         letters = AXIS_LETTERS[: self._curve.axes]
         stretches = simulate(
             self.device,

@@ -19,8 +19,9 @@ import numpy as np
 
 from discreta.hdl.circular import Circular
 from discreta.hdl.comparison import Comparison
+from discreta.hdl.constant_speed import constant_arc
 from discreta.hdl.contract import Part
-from discreta.hdl.device import Device
+from discreta.hdl.device import Device, exact_device
 from discreta.hdl.linear import Linear
 from discreta.hdl.plain import block_fields
 from discreta.hdl.queue import KINDS, BlockKind
@@ -28,6 +29,8 @@ from discreta.sim.carrier import add_timing, lengths
 from discreta.sim.compiled import CompiledModel
 from discreta.sim.conics import KINDS as CONIC_KINDS
 from discreta.sim.conics import random_blocks
+from discreta.sim.constant_speed import paced, plane, ticks_of
+from discreta.sim.contour import distance_from_circle
 from discreta.sim.feed import encode_feed, feed_of
 from discreta.sim.machine import Drive
 from discreta.sim.methods import METHODS
@@ -40,11 +43,15 @@ __all__ = [
     "MOVES",
     "RULES",
     "AccuracyRow",
+    "DriftRow",
+    "HelixRow",
     "LimitRow",
     "Rule",
     "SpeedRow",
     "accuracy",
     "along_path",
+    "drift",
+    "helices",
     "limits",
     "move_beginnings",
     "step_clocks",
@@ -58,6 +65,9 @@ MOVES = 40
 #: The speed along the path is measured at this F: slow enough for every interpolator, and the
 #: default pauses are whole clocks, so that a window is not a clock longer or shorter by chance.
 _SLOW = Fraction(1, 128)
+
+#: How far the machine is at any time is measured at this one.
+_STEADY = Fraction(1, 8)
 
 #: Bits of the devices that are measured along the path and at different F.
 _PATH_WIDTH, _PACE_WIDTH = 10, 18
@@ -135,6 +145,56 @@ class SpeedRow:
     smallest_at: str
     largest: float
     largest_at: str
+
+
+@dataclass(frozen=True)
+class DriftRow:
+    """How far a machine is from where a constant speed would have it, along the path.
+
+    Attributes
+    ----------
+    what : str
+        The curves that were run.
+    curves : int
+        How many.
+    ahead, behind : float
+        At most, in steps, from the first step to the last.
+    at_end : float
+        The larger of both, at the end.
+    """
+
+    what: str
+    curves: int
+    ahead: float
+    behind: float
+    at_end: float
+
+
+@dataclass(frozen=True)
+class HelixRow:
+    """What arcs with a further axis do.
+
+    Attributes
+    ----------
+    steepness : float
+        Steps of the further axis for every step of arc, at most.
+    helices : int
+    ends_missed : int
+        Of them were not done on their end point, in all axes.
+    off_circle : float
+        Largest distance from the circle, in steps; of points from which a step remains.
+    off_line : float
+        Largest distance of the further axis from where it belongs after so many ticks, in steps.
+    off_ticks : float
+        Largest difference between ``ticks`` and those there were.
+    """
+
+    steepness: float
+    helices: int
+    ends_missed: int
+    off_circle: float
+    off_line: float
+    off_ticks: float
 
 
 @dataclass(frozen=True)
@@ -288,20 +348,162 @@ def _circle(radius: int, clockwise: bool) -> _Path:
     return _Path(f"circles, R = {radius}", f"R = {radius}, {way}", block, (radius, 0), radius)
 
 
+def drift(
+    *,
+    degrees: Sequence[int] = range(360),
+    radii: Sequence[int] = (100, 1000, 4000),
+    length: int = 1000,
+    width: int = 13,
+) -> list[DriftRow]:
+    """Measure the distance travelled less F·t, on the pins of a device at constant speed.
+
+    Of lines it is the way along the line, of circles the angle times R. The first step leaves when
+    a step's length is due, at F·t = 1. Looked at just before every step, when the machine is
+    farthest behind, and at it.
+
+    Parameters
+    ----------
+    degrees : sequence of int
+        Directions of the lines, 0 to 359.
+    radii : sequence of int
+        Of the circles, each in both directions.
+    length : int
+        Of the lines, in steps.
+    width : int
+        n of the device.
+
+    Raises
+    ------
+    RuntimeError
+        There is no C++ compiler.
+    """
+    device = exact_device(width, kinds=("line", "arc"), depth=1)
+    curves = [_line(degree, length) for degree in degrees]
+    curves += [_circle(radius, clockwise) for radius in radii for clockwise in (False, True)]
+    for curve in curves:
+        kind = "line" if curve.radius is None else "arc"
+        block = [*curve.start, curve.block["end_x"], curve.block.get("end_y", 0)]
+        block += [0, 0, curve.block["clockwise"], 0] if kind == "arc" else []
+        curve.block["pace"] = int(paced(kind, np.array([block]), width, 2)[0, -1])
+    rows: dict[str, DriftRow] = {}
+    measured = _run_all(device, curves, _STEADY)
+    for curve, (clocks, points, _) in zip(curves, measured, strict=True):
+        way = _way(curve, points)
+        before = np.concatenate([[0], way[:-1]])
+        due = 1 + float(_STEADY) * (clocks - clocks[0])
+        group = curve.group if curve.radius is not None else f"lines of {length} steps"
+        row = rows.get(group, DriftRow(group, 0, 0.0, 0.0, 0.0))
+        rows[group] = DriftRow(
+            group,
+            row.curves + 1,
+            max(row.ahead, float(np.max(way - due))),
+            max(row.behind, float(np.max(due - before))),
+            max(row.at_end, float(abs(way[-1] - due[-1]))),
+        )
+    return list(rows.values())
+
+
+def _way(curve: _Path, points: np.ndarray) -> np.ndarray:
+    """Give how far points are along a line or a circle, in steps."""
+    if curve.radius is None:
+        end = np.array([curve.block["end_x"], curve.block["end_y"]], dtype=float)
+        return points @ (end / np.hypot(*end))
+    turned = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
+    sign = -1 if curve.block["clockwise"] else 1
+    return sign * turned * curve.radius
+
+
+def helices(
+    steepnesses: Sequence[float] = (0.1, 1, 5), count: int = 300, *, width: int = 12
+) -> list[HelixRow]:
+    """Run random arcs with a further axis, and measure all axes at every tick.
+
+    Parameters
+    ----------
+    steepnesses : sequence of float
+        Steps of the further axis for every step of arc, at most; drawn up to that.
+    count : int
+        Helices of each.
+    width : int
+        n; radii are up to 2^(n − 2).
+
+    Raises
+    ------
+    RuntimeError
+        There is no C++ compiler.
+    """
+    random = np.random.default_rng([SEED, width])
+    core = constant_arc(width, 3)
+    model = CompiledModel(core)
+    rows = []
+    try:
+        for steepness in steepnesses:
+            blocks = _random_helices(random, count, steepness, width)
+            rows.append(_helix_row(model, blocks, steepness, width))
+    finally:
+        model.close()
+    return rows
+
+
+def _random_helices(
+    random: np.random.Generator, count: int, steepness: float, width: int
+) -> np.ndarray:
+    """Draw arcs about the origin, both ends rounded, and a way of a third axis."""
+    blocks = np.zeros((count, 10), dtype=np.int64)
+    radius = np.exp(random.uniform(np.log(8), np.log(1 << (width - 2)), count))
+    for column in (0, 3):
+        angle = random.uniform(0, 2 * pi, count)
+        points = radius * [np.cos(angle), np.sin(angle)]
+        blocks[:, column : column + 2] = np.rint(points).T
+    blocks[:, 8] = random.integers(0, 2, count)
+    length = ticks_of("arc", blocks, 3)
+    top = (1 << width) - 1
+    way = np.rint(random.uniform(-1, 1, count) * steepness * length)
+    blocks[:, 2] = random.integers(-top // 4, top // 4, count)
+    blocks[:, 5] = np.clip(blocks[:, 2] + way, -top, top)
+    return blocks
+
+
+def _helix_row(model: CompiledModel, blocks: np.ndarray, steepness: float, width: int) -> HelixRow:
+    """Run helices one by one from reset."""
+    missed, off_circle, off_line, off_ticks = 0, 0.0, 0.0, 0.0
+    told = paced("arc", blocks, width, 3)
+    for block, row in zip(blocks, told, strict=True):
+        model.reset()
+        room = 4 * int(row[-1]) + _AROUND
+        seen = model.run(row[None], room, until_answered=1, event_room=room)
+        column = dict(zip(EVENT_COLUMNS, seen.events.T, strict=False))
+        taken = column["taken"] == 1
+        moves = seen.events[taken, len(EVENT_COLUMNS) : len(EVENT_COLUMNS) + 3]
+        points = block[:3] + np.cumsum(moves, axis=0)
+        ticks = len(points)
+        bad = seen.answered != 1 or column["error"].any() or not ticks
+        if bad or not np.array_equal(points[-1], block[3:6]):
+            missed += 1
+            continue
+        off_ticks = max(off_ticks, abs(ticks - int(row[-1])))
+        on_line = block[2] + (block[5] - block[2]) * np.arange(1, ticks + 1) / int(row[-1])
+        off_line = max(off_line, float(np.max(np.abs(points[:-1, 2] - on_line[:-1]), initial=0)))
+        start = np.broadcast_to(plane(block[None], 3)[0, :2], points[:-1, :2].shape)
+        away = distance_from_circle(points[:-1, :2], start)
+        off_circle = max(off_circle, float(np.max(away, initial=0)))
+    return HelixRow(steepness, len(blocks), missed, off_circle, off_line, off_ticks)
+
+
 def _run_all(
-    device: Device, curves: Sequence[_Path]
+    device: Device, curves: Sequence[_Path], feed: Fraction = _SLOW
 ) -> Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Run curves in one go; give for each clocks and points of its steps, and where moves begin.
 
     The points are those after the steps; the step number ``begins[k]`` is the first of a move.
     """
-    mantissa, exponent = encode_feed(_SLOW)
+    mantissa, exponent = encode_feed(feed)
     blocks = []
     for curve in curves:
         x, y = curve.start
         blocks.append({"kind": _PLACE, "end_x": x, "end_y": y})
         blocks.append({**curve.block, "feed_mantissa": mantissa, "feed_exponent": exponent})
-    limit = _most_clocks(sum(curve.way for curve in curves), _SLOW, len(blocks))
+    limit = _most_clocks(sum(curve.way for curve in curves), feed, len(blocks))
     clocks, points, answers = _run_on_pins(device, blocks, limit)
     begins = move_beginnings(np.diff(points, axis=0, prepend=0))
     # A place is answered when the pulses before it are over, and before the next ones.
@@ -538,7 +740,7 @@ def limits(
 def _limits_of(name: str, width: int) -> dict[str, np.ndarray]:
     """Give the clocks between all steps of a method, by the kind of its curves."""
     if name == DEVICE:
-        device = Device(line=Linear(width), arc=Circular(width))
+        device = exact_device(width)
         return {
             kind: _device_clocks(device, kind, _sample(kind, width)) for kind in ("line", "arc")
         }

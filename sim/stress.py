@@ -11,20 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from discreta.hdl.circular import Circular
-from discreta.hdl.conic import Conic
+from discreta.hdl.constant_speed import FRACTION_BITS
 from discreta.hdl.contract import Part
-from discreta.hdl.device import Device
+from discreta.hdl.device import Device, exact_device
 from discreta.hdl.feed import FULL_OVERRIDE, MAX_OVERRIDE, RATE_BITS
-from discreta.hdl.linear import Linear
 from discreta.hdl.queue import StopReason
 from discreta.sim.arcs import refusals
 from discreta.sim.compiled import CompiledModel
 from discreta.sim.conics import KINDS as CONIC_KINDS
 from discreta.sim.conics import motion, random_blocks
-from discreta.sim.golden.circular import Circular as GoldenCircular
-from discreta.sim.golden.conic import Conic as GoldenConic
-from discreta.sim.golden.linear import Linear as GoldenLinear
+from discreta.sim.golden.exact_arc import ExactArc as GoldenExactArc
+from discreta.sim.golden.exact_conic import ExactConic as GoldenExactConic
+from discreta.sim.golden.exact_line import ExactLine as GoldenExactLine
 from discreta.sim.plotter import Plotter, PulseTiming
 from discreta.sim.stalls import Stalls
 from discreta.sim.stretch import EVENT_COLUMNS
@@ -35,8 +33,9 @@ __all__ = ["WIDTHS", "Report", "make_device", "stress"]
 WIDTHS = (6, 7)
 
 _KINDS = ("line", "arc", "conic")
-_GOLDEN: tuple[Callable[[int], Any], ...] = (GoldenLinear, GoldenCircular, GoldenConic)
-#: What the interpolators are given besides start and end.
+#: Which steps there are, and in which order, does not depend on their speed: without ticks.
+_GOLDEN: tuple[Callable[[int], Any], ...] = (GoldenExactLine, GoldenExactArc, GoldenExactConic)
+#: What the interpolators are given besides start and end, and the pace.
 _OWN = (
     (),
     ("center_x", "center_y", "clockwise", "full_turns"),
@@ -67,7 +66,7 @@ _PATIENCE = 20
 
 def make_device(width: int) -> Device:
     """Make the device that is run: all interpolators, 16 blocks wait."""
-    return Device(line=Linear(width), arc=Circular(width), conic=Conic(width), depth=16)
+    return exact_device(width, kinds=_KINDS, depth=16)
 
 
 @dataclass
@@ -251,17 +250,18 @@ def _run_part(
 
 @dataclass(frozen=True)
 class _Block:
-    """A block: its kind's number, its end, what its kind has besides, and its speed."""
+    """A block: its kind's number, its end, what its kind has besides, its speed and its pace."""
 
     kind: int
     end: tuple[int, int]
     own: tuple[int, ...] = ()
     feed: tuple[int, int, int] = (0, 0, 0)
+    pace: int = 0
 
     def row(self, names: tuple[str, ...]) -> list[int]:
         """Write it as the device's ports have it."""
         values = dict(zip(_OWN[self.kind], self.own, strict=True))
-        values |= {"kind": self.kind, "end_x": self.end[0], "end_y": self.end[1]}
+        values |= {"kind": self.kind, "pace": self.pace, "end_x": self.end[0], "end_y": self.end[1]}
         values |= dict(zip(("feed_mantissa", "feed_exponent", "ahead"), self.feed, strict=True))
         return [values.get(name.removeprefix("blocks_"), 0) for name in names]
 
@@ -341,7 +341,19 @@ class _Supply:
         self, kind: int, end: tuple[int, ...], own: tuple[int, ...], feed: tuple[int, int]
     ) -> _Block:
         ahead = int(self.random.choice([0, 20, 200, 2000]))
-        return _Block(kind, (end[0], end[1]), own, (*feed, ahead))
+        pace = self._pace(kind, end, own) if self.random.random() < 0.8 else 0
+        return _Block(kind, (end[0], end[1]), own, (*feed, ahead), pace)
+
+    def _pace(self, kind: int, end: tuple[int, ...], own: tuple[int, ...]) -> int:
+        """Draw one that may be right, and is not always: it must be harmless."""
+        if kind == 0:
+            return int(self.random.integers(self.top << FRACTION_BITS))
+        if kind == 1:
+            radius = np.hypot(end[0] - own[0], end[1] - own[1])
+            most = (self.top << FRACTION_BITS + 1) - 1
+            factor = self.random.choice([1, self.random.uniform(0.25, 4)])
+            return min(most, max(1, round(radius * factor * 2**FRACTION_BITS)))
+        return 0
 
     def _of_no_length(self, at: tuple[int, int], feed: tuple[int, int]) -> _Block:
         own = {0: (), 1: (*at, 0, 0), 2: (1, 0, 1, 5, 5, 0, 0)}
@@ -354,7 +366,8 @@ class _Supply:
         x, y = at
         kind, end, own = (
             (0, (self.top - 1, y), ()),
-            (1, at, (self.top - 1, y, 0, 0)),
+            # Too far from the centre, on whichever side it is.
+            (1, at, (self.top - 1 if x < 0 else -self.top, y, 0, 0)),
             (1, (x + 9, y), (x + 3, y, 0, 0)),
             # The start is the centre of an ellipse.
             (2, (x + 3, y), (1, 0, 1, -2 * x, -2 * y, 0, 1)),
@@ -638,6 +651,7 @@ class _Run:
             events=np.concatenate([part.events for part in parts]),
             watch=np.concatenate([part.watch for part in parts]).astype(np.int16),
             pins=self._pins,
+            top=self._supply.top,
             total=self._clock + sum(part.ran for part in parts),
             stood=int(self._watched[0]),
             came_to_rest=main.idle,
@@ -719,7 +733,7 @@ class _Seen:
     """What was seen of an episode.
 
     Up to ``end`` it ran, from then on it stood to ``total``; before it ``pins`` were what they were
-    and ``stood`` was the reason.
+    and ``stood`` was the reason. Coordinates are −``top`` to ``top`` − 1.
     """
 
     begin: int
@@ -729,6 +743,7 @@ class _Seen:
     events: np.ndarray
     watch: np.ndarray
     pins: np.ndarray
+    top: int
     total: int
     stood: int
     came_to_rest: bool
@@ -797,6 +812,8 @@ class _Judge:
         points = np.concatenate([seen.start[None], seen.start + np.cumsum(self.moves, axis=0)])
         clocks = seen.begin + np.arange(len(seen.watch))
         counted = points[np.searchsorted(self.when, clocks, side="right")]
+        # A curve that is offered again from elsewhere may lead out of the coordinates there are.
+        counted = (counted + seen.top) % (2 * seen.top) - seen.top
         wrong = np.flatnonzero((counted != seen.watch[:, 1:]).any(axis=1))
         if not len(wrong):
             return ""

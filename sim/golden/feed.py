@@ -90,8 +90,8 @@ class FeedUnit:
 
         ``inputs``: ``active``, ``begins``, ``feed_mantissa``, ``feed_exponent``, ``ahead``,
         ``taken``, ``even``, ``moves_x``, ``moves_y`` …, ``override``, ``acceleration``, ``hold``,
-        ``single``. ``tell`` is told the name of every partial sum of the product, ``sum_1`` to ``sum_8``, and
-        gives what to go on with.
+        ``single``. ``tell`` is told the name of every partial sum of the product, ``sum_1`` to
+        ``sum_8``, and gives what to go on with.
         """
         after = self._target(state, inputs, tell) | self._ramp(state, inputs)
         after |= self._pause(state, inputs)
