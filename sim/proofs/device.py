@@ -10,8 +10,9 @@ from dataclasses import replace
 
 import z3
 
-from discreta.sim.golden.conic import Conic
+from discreta.sim.golden.constant_speed import ConstantSpeed
 from discreta.sim.golden.device import EMERGENCY, LIMIT, STOP, Device
+from discreta.sim.golden.exact_conic import ExactConic
 from discreta.sim.golden.logic import Value
 from discreta.sim.golden.queue import CODES, REFUSED
 from discreta.sim.proofs import queue
@@ -20,7 +21,11 @@ from discreta.sim.smt import Obligation, symbols
 __all__ = ["promises"]
 
 #: Registers that prepare the next block, or tell of the last one, while a step waits.
-_PREPARING = ("done", "error", "pending", "fault", "start_", "delta_", "negative_")
+_PREPARING = (
+    *("done", "error", "pending", "fault", "start_", "delta_", "open", "weighed", "beyond_"),
+    *("way_", "chosen", "sum_down", "difference_down", "ready_", "prepared", "refused"),
+    *("next_", "timer_next", "timer_ended"),
+)
 
 
 def promises(golden: Device) -> list[Obligation]:
@@ -316,10 +321,16 @@ class _Clock:
         )
         waiting = {}
         for kind, part in golden.interpolators:
-            if isinstance(part, Conic):
+            if isinstance(part, ExactConic):
                 continue  # it prepares a block in the very registers in which it runs
-            preparing = getattr(part, "prepared_registers", dict)()
-            steps = part.outputs(golden.part_state(state, kind, part))["steps_valid"] == 1
+            core = part.core if isinstance(part, ConstantSpeed) else part
+            preparing = getattr(core, "prepared_registers", dict)()
+            own = golden.part_state(state, kind, part)
+            answers = core.outputs(own)
+            # It answers only when no step waits; that is its own promise.
+            steps = z3.And(
+                part.outputs(own)["steps_valid"] == 1, answers["done"] == 0, answers["error"] == 0
+            )
             waiting |= {
                 f"{kind} {name}": z3.Implies(
                     steps, after[f"{kind}_{name}"] == state[f"{kind}_{name}"]

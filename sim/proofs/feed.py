@@ -36,7 +36,7 @@ def _inputs_of(golden: FeedUnit) -> dict[str, tuple[int, bool]]:
         "override": (9, False),
         "acceleration": (40, False),
     }
-    flags = ["active", "begins", "taken", "hold", "single"]
+    flags = ["active", "begins", "taken", "even", "hold", "single"]
     flags += [f"moves_{a}" for a in golden.letters]
     return kinds | dict.fromkeys(flags, (1, False))
 
@@ -64,6 +64,10 @@ class _Registers:
         self.active, self.taken, self.begins, self.hold, self.single = (
             self.inputs[name] == 1 for name in ("active", "taken", "begins", "hold", "single")
         )
+        #: Something moves: of ticks at constant speed some move nothing.
+        self.moving = z3.And(
+            self.taken, z3.Or([self.inputs[f"moves_{a}"] == 1 for a in golden.letters])
+        )
         self.acceleration = self.inputs["acceleration"]
         self.permit, self.still = (
             golden.outputs(self.state)[it] == 1 for it in ("permit", "still")
@@ -88,12 +92,14 @@ class _Registers:
         """Give every case of axes before and now: name, condition, pause, axes of the move."""
         axes = self.golden.axes
         pause = (0, *self.golden.pauses)
+        yield "tick", self.inputs["even"] == 1, STEP, 0
         for before in range(1 << axes):
             for moves in range(1 << axes):
                 joins = self.golden.pairing and before and not before & moves
                 together = before | moves if joins else moves
                 cost = pause[together.bit_count()] - (pause[before.bit_count()] if joins else 0)
                 condition = z3.And(
+                    self.inputs["even"] == 0,
                     self.state["cell"] == before,
                     *(
                         self.inputs[f"moves_{a}"] == (moves >> place & 1)
@@ -287,16 +293,16 @@ class _Registers:
             ),
             Obligation("still: it stays so under hold", [*held, self.still], [later_still]),
             Obligation(
-                "single step: one waits after a rising edge under hold, until it is taken, and "
-                "without another edge none after it",
+                "single step: one waits after a rising edge under hold, until one is taken that "
+                "moves an axis, and without another edge none after it",
                 [],
                 {
                     "edge": z3.Implies(z3.And(self.hold, rises), waits),
                     "until taken": z3.Implies(
-                        z3.And(self.hold, waiting, z3.Not(self.taken)), waits
+                        z3.And(self.hold, waiting, z3.Not(self.moving)), waits
                     ),
                     "one": z3.Implies(
-                        z3.And(z3.Not(rises), z3.Or(self.taken, z3.Not(waiting))), z3.Not(waits)
+                        z3.And(z3.Not(rises), z3.Or(self.moving, z3.Not(waiting))), z3.Not(waits)
                     ),
                     "not without hold": z3.Implies(z3.Not(self.hold), z3.Not(waits)),
                     "edge is seen": after["single_before"] == self.inputs["single"],
