@@ -340,4 +340,5 @@ def constant_line(width: int = 16, axes: int = 2) -> ConstantSpeed:
 
 def constant_arc(width: int = 16, axes: int = 2) -> ConstantSpeed:
     """Make an exact arc at constant speed; axes beyond two move along it."""
+    check_axes(axes)
     return ConstantSpeed(ExactArc(width), axes)
