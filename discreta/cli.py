@@ -1087,18 +1087,36 @@ def _table(headings: tuple[str, ...], left: int = 1) -> Table:
 def feed_command() -> None:
     """Measure speed along the path, and how exactly F is kept, on the device's pins.
 
-    The first tables show, for lines at every whole degree and for circles, how far the speed is
-    from F in windows of 40 moves, in percent: with the device's own rule for the pauses after a
-    step, with the exercise's, and with the exercise's but for the root of 2. The last one shows
-    the error of the mean pause for speeds of every octave from 1 to 2^-24, in 2^-16. Takes a
-    minute or so. Exits 1 when F is off by more than that anywhere.
+    The first table is of the exact lines and arcs: how far, in steps, the machine is at most ahead
+    of F·t or behind it, on lines at every whole degree and on whole circles; the second one of arcs
+    with a further axis. Then the lecture's interpolators, whose speed is made by pauses: for the
+    same lines and for circles, how far the speed is from F in windows of 40 moves, in percent: with
+    the device's own rule for the pauses after a step, with the exercise's, and with the exercise's
+    but for the root of 2. The last one shows the error of the mean pause for speeds of every octave
+    from 1 to 2^-24, in 2^-16. Takes a minute or so. Exits 1 when F is off by more than that
+    anywhere, or a machine by 2 steps, or a further axis misses its end.
 
     Example: discreta feed
     """
-    from discreta.sim.speed import RULES, accuracy, along_path
+    from discreta.sim.speed import RULES, accuracy, along_path, drift, helices
 
     _needs_compiler()
     out = _out()
+    table = _table(("curves", "how many", "ahead of F·t, steps", "behind", "at the end"))
+    drifts = drift()
+    for row in drifts:
+        off = (f"{value:.3f}" for value in (row.ahead, row.behind, row.at_end))
+        table.add_row(row.what, str(row.curves), *off)
+    out.print("constant speed")
+    out.print(table)
+    columns = ("steps for one of arc", "helices", "ends missed", "off the circle, steps")
+    table = _table((*columns, "off the line, steps", "ticks off"), left=0)
+    turned = helices()
+    for row in turned:
+        off = (f"{row.off_circle:.4f}", f"{row.off_line:.4f}", f"{row.off_ticks:g}")
+        table.add_row(f"{row.steepness:g}", str(row.helices), str(row.ends_missed), *off)
+    out.print("arcs with a further axis")
+    out.print(table)
     for rule in RULES:
         table = _table(("curves", "windows", "slowest, %", "at", "fastest, %", "at"))
         for row in along_path(rule):
@@ -1115,7 +1133,10 @@ def feed_command() -> None:
         table.add_row(f"2^-{row.octave}", str(row.speeds), error, str(row.clocks))
     out.print("accuracy of F")
     out.print(table)
-    if max(row.largest_error for row in rows) > 1:
+    good = max(row.largest_error for row in rows) <= 1
+    good &= max(max(row.ahead, row.behind) for row in drifts) < 2
+    good &= not any(row.ends_missed for row in turned)
+    if not good:
         raise click.exceptions.Exit(1)
 
 
