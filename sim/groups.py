@@ -376,6 +376,9 @@ def whole_degrees(method: Method, width: int) -> list[Group]:
         raise ValueError(f"{method.name} has no arcs between whole degrees: survey circular")
     if method.curve != "arc":
         raise ValueError(f"there are no {method.curve}s between whole degrees: survey circular")
+    if method.exact:
+        # It does not know which ends are too far off the circle.
+        raise ValueError(f"{method.name} has no arcs between whole degrees: survey circular")
     far = _RADII[-1] + 1
     if far >= 1 << width:
         raise ValueError(
