@@ -779,7 +779,7 @@ def test_survey_of_all_the_exact_ones(discreta, monkeypatch):
     def few(method, width):
         chosen = survey_groups(method, width)[:1]
         return [
-            Group(group.title, group.blocks[:9], group.answers[:9], group.lengths[:9])
+            Group(group.title, group.blocks[-9:], group.answers[-9:], group.lengths[-9:])
             for group in chosen
         ]
 
@@ -955,7 +955,8 @@ BAD = {
     ),
     "a period without a carrier": (
         [*ARC, "--period", "200"],
-        "--period is no option of exact_arc, which has no carrier: choose --method carrier_circular",
+        "--period is no option of exact_arc, which has no carrier: choose --method "
+        "carrier_circular",
     ),
     "a formula of a line": (
         [*TIMED_LINE, "--formula", "plain"],
