@@ -1056,7 +1056,8 @@ def survey_command(
     round. On a carrier: a sample of them all with a sample of timings, and some whose timing is to
     be refused. The column 99.9 % has the error that so many of the blocks do not exceed. Clocks are
     those in which the device sums, per step of the axis that moves faster. Runs on the compiled
-    engine. Exits 1 when a register differs from the golden model or an end is missed.
+    engine. Exits 1 when a register differs from the golden model, an end is missed or an error is
+    above the proven bound.
 
     Example: discreta survey exact_line --width 8
     """

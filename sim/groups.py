@@ -7,7 +7,7 @@ from math import ceil, pi, sqrt
 import numpy as np
 
 from discreta.hdl.contract import MIN_WIDTH
-from discreta.sim.arcs import RANGE, faster_steps, radii, refusals
+from discreta.sim.arcs import RANGE, faster_steps, in_parts, radii, refusals
 from discreta.sim.carrier import angles, least_periods, lengths
 from discreta.sim.conics import KINDS, ellipse, motion, random_blocks
 from discreta.sim.methods import Method
@@ -188,7 +188,7 @@ def _exact_arc_groups(width: int) -> list[Group]:
     arcs[:, :4] += np.tile(center, 2)
     arcs[:, 6] = random.integers(0, 2, count)
     return [
-        Group(title, blocks, np.zeros(len(blocks), dtype=np.int64), faster_steps(blocks))
+        Group(title, blocks, np.zeros(len(blocks), dtype=np.int64), in_parts(faster_steps, blocks))
         for title, blocks in (
             (_how_many(len(circles), top, "quarter arcs"), _about_origin(circles, quarter=True)),
             (_how_many(len(circles), top, "circles"), _about_origin(circles)),
