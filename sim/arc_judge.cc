@@ -1,4 +1,4 @@
-// Judges the steps of exact arcs as they come: see discreta.sim.arc_judge, which names the fields.
+// Judges the steps of exact arcs as they come. See discreta.sim.arc_judge, which names the same fields.
 
 #include <cstdint>
 

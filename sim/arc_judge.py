@@ -1,9 +1,10 @@
 """Judges the steps of exact arcs in C++: billions of them.
 
-What :class:`~discreta.sim.contour.ExactArcContour` works out with NumPy, point by point, a loop in
-``arc_judge.cc`` keeps for every block: the farthest point outside the circle and the farthest one
-inside, by X² + Y² − R², which is a whole number; whether a step led back; whether the end was
-reached. The distances of these points are worked out afterwards.
+A loop in ``arc_judge.cc`` keeps for every block the farthest point outside the circle and the
+farthest one inside, by X² + Y² − R², which is a whole number; whether a step led back; whether the
+end was reached. The distances of these points are worked out afterwards. The end of a block may be
+off the circle, by part of a step, and is not counted; a step back, against the way round, counts as
+infinitely far.
 """
 
 import ctypes
@@ -40,7 +41,7 @@ def _library() -> ctypes.CDLL:
 
 
 class ArcJudge:
-    """Follows arc blocks of the exact interpolator; see ``ExactArcContour`` for what is judged.
+    """Follows arc blocks of the exact interpolator, as a :class:`~discreta.sim.contour.Contour`.
 
     Parameters
     ----------
@@ -50,7 +51,7 @@ class ArcJudge:
     Attributes
     ----------
     block_steps, block_errors, reached, largest_error, error_at
-        As those of a :class:`~discreta.sim.contour.Contour`.
+        Those of a ``Contour``.
 
     Raises
     ------

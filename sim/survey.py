@@ -24,6 +24,7 @@ from discreta.sim.contour import (
     ArcContour,
     ConicContour,
     Contour,
+    ExactConicContour,
     LineContour,
 )
 from discreta.sim.groups import SEED, Group
@@ -319,6 +320,10 @@ class _ExactConics(_Conics):
 
     watch: tuple[str, ...] = ("running",)
     cost: int = 1
+
+    def contour(self, blocks: np.ndarray) -> ExactConicContour:
+        """Compare with the curves."""
+        return ExactConicContour(blocks)
 
     def clocks(self, method: Method, golden: Any, group: Group) -> np.ndarray:
         """Give the most clocks that they can take, and few take fewer."""
