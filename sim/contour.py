@@ -12,7 +12,7 @@ __all__ = [
     "ArcContour",
     "ConicContour",
     "Contour",
-    "ExactArcContour",
+    "ExactConicContour",
     "LineContour",
     "distance_from_circle",
     "distance_from_line",
@@ -265,38 +265,6 @@ class ArcContour(Contour):
         return distance_from_circle(points - centers, self.starts[blocks] - centers)
 
 
-class ExactArcContour(ArcContour):
-    """Follows arc blocks of the exact interpolator, which are held to more.
-
-    The end of a block may be off the circle and is not counted; and a step back, against the way
-    round, counts as infinitely far.
-
-    Parameters
-    ----------
-    blocks : array of int64, shape (blocks, 8)
-        See :mod:`discreta.sim.arcs`.
-    """
-
-    def __init__(self, blocks: np.ndarray):
-        super().__init__(blocks)
-        self._side = np.where(blocks[:, 6] == 1, -1, 1)
-
-    def errors(self, points: np.ndarray, blocks: np.ndarray) -> np.ndarray:
-        """Give the distances of points from the circles of their blocks, 0 for ends."""
-        ends = np.all(points == self.ends[blocks], axis=1)
-        return np.where(ends, 0.0, super().errors(points, blocks))
-
-    def _judge(self, which: np.ndarray, points: np.ndarray, errors: np.ndarray) -> None:
-        """Count the steps and keep the largest errors."""
-        if len(which):
-            before = np.roll(points, 1, axis=0)
-            first = np.flatnonzero(np.diff(which, prepend=-1))
-            before[first] = self._places[which[first]]
-            (x, y), (u, v) = (before - self.centers[which]).T, (points - before).T
-            errors[self._side[which] * (x * v - y * u) < 0] = np.inf
-        super()._judge(which, points, errors)
-
-
 class ConicContour(Contour):
     """Follows blocks of second-order curves: the distance of a point is that from its whole curve.
 
@@ -323,3 +291,21 @@ class ConicContour(Contour):
             curves = self._curves[:, blocks[part]]
             errors[part] = distance(curves[:5].T, curves[5:].T, points[part])
         return errors
+
+
+class ExactConicContour(ConicContour):
+    """Follows blocks of the exact interpolator: the end of a block may be off its curve.
+
+    It is not counted: between the curve and the point of the grid that is nearest to its end there
+    may be √½ of a step.
+
+    Parameters
+    ----------
+    blocks : array of int64, shape (blocks, 11)
+        See :mod:`discreta.sim.conics`.
+    """
+
+    def errors(self, points: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+        """Give the distances of points from the curves of their blocks, 0 for ends."""
+        ends = np.all(points == self.ends[blocks], axis=1)
+        return np.where(ends, 0.0, super().errors(points, blocks))

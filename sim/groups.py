@@ -7,7 +7,7 @@ from math import ceil, pi, sqrt
 import numpy as np
 
 from discreta.hdl.contract import MIN_WIDTH
-from discreta.sim.arcs import RANGE, faster_steps, radii, refusals
+from discreta.sim.arcs import RANGE, faster_steps, in_parts, radii, refusals
 from discreta.sim.carrier import angles, least_periods, lengths
 from discreta.sim.conics import KINDS, ellipse, motion, random_blocks
 from discreta.sim.methods import Method
@@ -30,6 +30,9 @@ _LINES, _ARCS, _CURVES, _TEN_TURNS = 1 << 16, 1 << 10, 20_000, 32
 
 #: Arcs of a sample for the exact interpolator, by the width; and their largest radius for 2^width.
 _EXACT_ARCS, _EXACT_RADIUS = {12: 2_000_000}, 2800 / 4096
+
+#: Whole turned ellipses for the exact interpolator.
+_WHOLE_ELLIPSES = 512
 
 #: On a carrier: steps per period from and to, along the longer axis of a line and along an arc, and
 #: clocks of a period more than those that every variant needs.
@@ -72,8 +75,9 @@ def survey_groups(method: Method, width: int) -> list[Group]:
     counter-clockwise about the origin all quarter arcs from (R, 0) to (0, R), all circles from (R,
     0) and ten turns of some of them, evenly spread; and a sample of arcs of any radius, center,
     start, end and direction. Conics: 20,000 random curves of every kind, and ten turns of ellipses
-    about the origin of any axis ratio and angle. A group that would take more than
-    :data:`WHOLE_BUDGET` summations is a sample that takes up to :data:`SAMPLE_BUDGET`.
+    about the origin of any axis ratio and angle, of which the exact interpolator runs 512 once
+    round, too. A group that would take more than :data:`WHOLE_BUDGET` summations is a sample that
+    takes up to :data:`SAMPLE_BUDGET`.
 
     The exact interpolator of arcs runs all quarter arcs and circles, and a sample of 65,536 arcs,
     of 12 bits 2,000,000, of radii up to 0.68 times 2^width, the largest that have room anywhere;
@@ -188,7 +192,7 @@ def _exact_arc_groups(width: int) -> list[Group]:
     arcs[:, :4] += np.tile(center, 2)
     arcs[:, 6] = random.integers(0, 2, count)
     return [
-        Group(title, blocks, np.zeros(len(blocks), dtype=np.int64), faster_steps(blocks))
+        Group(title, blocks, np.zeros(len(blocks), dtype=np.int64), in_parts(faster_steps, blocks))
         for title, blocks in (
             (_how_many(len(circles), top, "quarter arcs"), _about_origin(circles, quarter=True)),
             (_how_many(len(circles), top, "circles"), _about_origin(circles)),
@@ -322,12 +326,15 @@ def _conic_groups(method: Method, width: int) -> list[Group]:
             blocks, lengths = blocks[:count], lengths[:count]
         title = f"a sample (seed {SEED}) of {len(blocks)} {kind}s"
         groups.append(Group(title, blocks, np.zeros(len(blocks), dtype=np.int64), lengths))
-    blocks = _random_ellipses(width, _TEN_TURNS, full_turns=9)
-    lengths, summations = _work_of_conics(blocks, guard)
-    count = np.searchsorted(np.cumsum(summations), SAMPLE_BUDGET)
-    title = f"ten turns of {count} ellipses"
-    answers = np.zeros(count, dtype=np.int64)
-    return [*groups, Group(title, blocks[:count], answers, lengths[:count])]
+    whole = [("whole", _WHOLE_ELLIPSES, 0)] if method.exact else []
+    for what, most, full_turns in (*whole, ("ten turns of", _TEN_TURNS, 9)):
+        blocks = _random_ellipses(width, most, full_turns=full_turns)
+        lengths, summations = _work_of_conics(blocks, guard)
+        count = np.searchsorted(np.cumsum(summations), SAMPLE_BUDGET)
+        answers = np.zeros(count, dtype=np.int64)
+        title = f"{what} {count} ellipses" if full_turns else f"{count} {what} turned ellipses"
+        groups.append(Group(title, blocks[:count], answers, lengths[:count]))
+    return groups
 
 
 def _work_of_conics(blocks: np.ndarray, guard: int) -> tuple[np.ndarray, np.ndarray]:
@@ -376,6 +383,9 @@ def whole_degrees(method: Method, width: int) -> list[Group]:
         raise ValueError(f"{method.name} has no arcs between whole degrees: survey circular")
     if method.curve != "arc":
         raise ValueError(f"there are no {method.curve}s between whole degrees: survey circular")
+    if method.exact:
+        # It does not know which ends are too far off the circle.
+        raise ValueError(f"{method.name} has no arcs between whole degrees: survey circular")
     far = _RADII[-1] + 1
     if far >= 1 << width:
         raise ValueError(

@@ -40,7 +40,7 @@ from discreta.sim.golden.two_stage import TwoStage as GoldenTwoStage
 from discreta.sim.golden.two_stage import two_stage_circular as golden_two_stage_circular
 from discreta.sim.golden.two_stage import two_stage_linear as golden_two_stage_linear
 
-__all__ = ["METHODS", "Design", "Method"]
+__all__ = ["DEFAULTS", "METHODS", "Design", "Method"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -379,6 +379,21 @@ METHODS = {
             bound=lambda _: 1.0,
         ),
         Method(
+            name="exact_arc",
+            curve="arc",
+            summary="arc of any length, every step chosen by the circle's own residual",
+            error_bound="½, and the end exact",
+            clocks_per_step="1 a step, 1 more where the faster axis or a direction changes",
+            device=ExactArc,
+            golden=GoldenExactArc,
+            axes=(2,),
+            choices={},
+            settings={"default": {}},
+            clocks=_exact_arc_clocks,
+            bound=lambda _: 0.5,
+            exact=True,
+        ),
+        Method(
             name="circular",
             curve="arc",
             summary="arc of any length by cross-coupled summation of its coordinates (DDA)",
@@ -406,19 +421,19 @@ METHODS = {
             bound=lambda _: None,
         ),
         Method(
-            name="exact_arc",
-            curve="arc",
-            summary="arc of any length, every step chosen by the circle's own residual",
-            error_bound="½, and the end exact",
-            clocks_per_step="1 a step, 1 more where the faster axis or a direction changes",
-            device=ExactArc,
-            golden=GoldenExactArc,
-            axes=(2,),
+            name="exact_conic",
+            curve="conic",
+            summary="any curve of the second order through its nearest points, by its residual",
+            error_bound="0.5; measured",
+            clocks_per_step="1, and 1 for each of the 8 octants of a turn",
+            device=ExactConic,
+            golden=GoldenExactConic,
             choices={},
             settings={"default": {}},
-            clocks=_exact_arc_clocks,
-            bound=lambda _: 0.5,
+            clocks=_exact_conic_clocks,
+            bound=lambda _: None,
             exact=True,
+            max_width=CONIC_MAX_WIDTH,
         ),
         Method(
             name="conic",
@@ -441,21 +456,6 @@ METHODS = {
             },
             clocks=_conic_clocks,
             bound=lambda _: None,
-            max_width=CONIC_MAX_WIDTH,
-        ),
-        Method(
-            name="exact_conic",
-            curve="conic",
-            summary="any curve of the second order through its nearest points, by its residual",
-            error_bound="0.5; measured",
-            clocks_per_step="1, and 1 for each of the 8 octants of a turn",
-            device=ExactConic,
-            golden=GoldenExactConic,
-            choices={},
-            settings={"default": {}},
-            clocks=_exact_conic_clocks,
-            bound=lambda _: None,
-            exact=True,
             max_width=CONIC_MAX_WIDTH,
         ),
         Method(
@@ -530,3 +530,6 @@ METHODS = {
         ),
     )
 }
+
+#: The default method of every kind of curve: the exact one, by its name.
+DEFAULTS = {method.curve: method.name for method in METHODS.values() if method.exact}

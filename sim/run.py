@@ -100,21 +100,24 @@ def run(
     DeadCoreError
         The device does not answer.
     """
+    fitting = {name: other for name, other in METHODS.items() if other.curve == curve.kind}
     if method.curve != curve.kind:
-        fitting = [name for name, other in METHODS.items() if other.curve == curve.kind]
         raise BadInputError(
             f"method {method.name} draws {method.curve}s and no {curve.kind}s: choose "
             f"{' or '.join(fitting)}"
         )
     if curve.axes not in method.axes:
+        able = [name for name, other in fitting.items() if curve.axes in other.axes]
         raise BadInputError(
             f"the {curve.kind} has {curve.axes} axes and method {method.name} {method.axes[0]}: "
-            "choose linear"
+            f"choose {' or '.join(able)}"
         )
     given = {"speed": speed, "period": period}
     for name in () if method.timed else [name for name in given if given[name] is not None]:
+        timed = [other.name for other in fitting.values() if other.timed]
         raise BadInputError(
-            f"--{name} is no option of {method.name}, which has no carrier: leave it out"
+            f"--{name} is no option of {method.name}, which has no carrier: "
+            f"{f'choose --method {timed[0]}' if timed else 'leave it out'}"
         )
     if drive is not None and method.timed:
         raise BadInputError(

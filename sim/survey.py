@@ -16,14 +16,15 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from discreta.sim.arcs import seen_from_center
+from discreta.sim.arc_judge import ArcJudge
+from discreta.sim.arcs import in_parts, seen_from_center
 from discreta.sim.compiled import CompiledModel
 from discreta.sim.conics import motion
 from discreta.sim.contour import (
     ArcContour,
     ConicContour,
     Contour,
-    ExactArcContour,
+    ExactConicContour,
     LineContour,
 )
 from discreta.sim.groups import SEED, Group
@@ -39,6 +40,9 @@ REGISTER_BUDGET = 1 << 27
 
 #: Clocks of a part of a survey, and clocks that the golden model works out at a time.
 _PART, _BATCH = 1 << 24, 1 << 13
+
+#: What an error may be off by its rounding, in steps.
+_ROUNDING = 1e-9
 
 #: Clocks of a run beside those of its blocks: up to the first acceptance, and the last answer.
 _OVERHEAD = 2
@@ -73,7 +77,8 @@ class SurveyRow:
     length : float
         Steps of the axis that moves faster, of all blocks.
     findings : list of str
-        Where RTL and golden model differ or why the device was given up, the first of every part.
+        Where RTL and golden model differ, why the device was given up, or which error is above the
+        proven bound, the first of every part.
     block_errors : array of float
         The largest error of every block that was not to be refused, in any order.
     """
@@ -100,7 +105,7 @@ class SurveyRow:
 
     @property
     def good(self) -> bool:
-        """RTL and golden model agree and no end was missed."""
+        """RTL and golden model agree, no end was missed and no proven bound exceeded."""
         return not self.findings and not self.ends_missed
 
     def add(self, other: "SurveyRow") -> None:
@@ -215,13 +220,13 @@ class _ExactArcs(_Arcs):
     watch: tuple[str, ...] = ("running",)
     cost: int = 16
 
-    def contour(self, blocks: np.ndarray) -> ExactArcContour:
+    def contour(self, blocks: np.ndarray) -> ArcJudge:
         """Compare with the circles."""
-        return ExactArcContour(blocks)
+        return ArcJudge(blocks)
 
     def clocks(self, method: Method, golden: Any, group: Group) -> np.ndarray:
         """Give the most clocks that they can take, and few take fewer."""
-        return method.clocks(golden, group.blocks)
+        return in_parts(lambda blocks: method.clocks(golden, blocks), group.blocks)
 
     def completing(self, seen: dict[str, np.ndarray]) -> np.ndarray:
         """Tell that there are no completing steps."""
@@ -315,6 +320,10 @@ class _ExactConics(_Conics):
 
     watch: tuple[str, ...] = ("running",)
     cost: int = 1
+
+    def contour(self, blocks: np.ndarray) -> ExactConicContour:
+        """Compare with the curves."""
+        return ExactConicContour(blocks)
 
     def clocks(self, method: Method, golden: Any, group: Group) -> np.ndarray:
         """Give the most clocks that they can take, and few take fewer."""
@@ -447,6 +456,12 @@ def _survey_part(part: _Part) -> SurveyRow:
     except DeadCoreError as error:
         judge.findings.append(str(error))
     contour = judge.contour
+    bound = method.bound(golden)
+    if bound is not None and contour.largest_error > bound + _ROUNDING:
+        judge.findings.append(
+            f"the error is {contour.largest_error:.4f} at {say_point(contour.error_at)}, where "
+            f"{bound:.4f} is proven"
+        )
     right = np.where(answers == 0, contour.reached, contour.block_steps == 0)
     return SurveyRow(
         part.variant,

@@ -36,6 +36,7 @@ from discreta.hdl.pulse import PulseUnit
 from discreta.hdl.quadrant import line_block_layout
 from discreta.hdl.verilog import verilog
 from discreta.sim import speed as speeds
+from discreta.sim.groups import Group, survey_groups
 from discreta.sim.methods import METHODS
 from discreta.sim.smt import Verdict
 from discreta.sim.synth import RUNS, CriticalPath, Measurement
@@ -53,6 +54,8 @@ CIRCLE = [*CIRCLE, "--direction", "ccw"]
 CW = ["--direction", "cw"]
 BEZIER = [*CONIC, "--parabola", "0,20", "--start", "0,0", "--end", "80,40"]
 PYSIM = ["--engine", "pysim"]
+#: The lecture's own methods.
+BY_LINEAR, BY_CIRCULAR, BY_CONIC = (["--method", name] for name in ("linear", "circular", "conic"))
 BORDER = Path(__file__).parents[1] / "examples/bulgaria.csv"
 
 
@@ -143,7 +146,7 @@ def exercise_3(xh, yh, xk, yk):
 
 def test_exercise_3(discreta):
     """The textbook's own line, point by point and clock by clock."""
-    options = ["--width", 16, "--no-normalize", "--preload", "zero", *PYSIM]
+    options = [*BY_LINEAR, "--width", 16, "--no-normalize", "--preload", "zero", *PYSIM]
     code, out, err = discreta(
         *("simulate", "line", "--start", "0,0", "--end", "200,99"), *options, "--trace", "-"
     )
@@ -168,12 +171,14 @@ def test_exercise_3(discreta):
 
 
 def test_the_border(discreta):
-    """All 178 segments through the RTL: every support point hit, closed, no clock lost."""
+    """All 178 segments by summation: every support point hit, closed, no clock lost."""
     with BORDER.open() as lines:
         points = [tuple(map(int, row)) for row in list(csv.reader(lines))[1:]]
     assert len(points) == 179
     assert points[0] == points[-1]
-    code, out, err = discreta("simulate", "path", BORDER, *PYSIM, "--trace", "t.csv", "--json", "-")
+    code, out, err = discreta(
+        *("simulate", "path", BORDER, *BY_LINEAR), *PYSIM, "--trace", "t.csv", "--json", "-"
+    )
     assert code == 0
     summary = json.loads(out)
     _, rows = read_trace(Path("t.csv").read_text())
@@ -203,6 +208,53 @@ def test_the_border(discreta):
     assert table(err)["support points hit"] == "178"
 
 
+DRAWN = {"exact_line": LINE, "exact_arc": ARC, "exact_conic": CIRCLE}
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_an_exact_method_is_the_default_one(discreta, name):
+    """No step leads half a step off the curve, and there is one in every clock or two."""
+    said = {}
+    for method in ([], ["--method", "exact"], ["--method", name]):
+        code, out, err = discreta(*DRAWN[name], *method, *PYSIM, "--width", 6, "--trace", "-")
+        assert code == 0
+        said[tuple(method)] = out, {**table(err), "time": ""}
+    (out, summary), *others = said.values()
+    assert others == [(out, summary)] * 2
+    assert summary["method"] == name
+    assert float(summary["largest error"]) < 0.5
+    assert summary["end point reached"] == "yes"
+    clocks = [clock for clock, _ in read_trace(out)[1]]
+    assert {later - clock for clock, later in pairwise(clocks[1:])} <= {1, 2}
+
+
+def test_the_exact_border(discreta):
+    """The README's own first command: every support point, half a step off at most."""
+    code, out, _ = discreta("simulate", "path", BORDER, "--trace", "t.csv", "--json", "-")
+    assert code == 0
+    summary = json.loads(out)
+    with BORDER.open() as lines:
+        points = [tuple(map(int, row)) for row in list(csv.reader(lines))[1:]]
+    lengths = [max(abs(u - x), abs(v - y)) for (x, y), (u, v) in pairwise(points)]
+    expected = {"method": "exact_line", "largest error": 0.4999, "error bound": 0.5}
+    expected |= {"steps": sum(lengths), "support points hit": 178, "path closed": True}
+    # The first step waits 7 clocks, and one lies between two lines.
+    expected |= {"clocks": sum(lengths) + 6 + len(lengths) - 1, "end point reached": True}
+    assert summary == summary | expected
+
+
+@pytest.mark.usefixtures("compiled_engine")
+@pytest.mark.parametrize("name", DRAWN)
+def test_the_device_runs_a_default_method(discreta, name):
+    code, out, _ = discreta(*DRAWN[name], "--width", 6, "--feed", "1/2", "--json", "-")
+    assert code == 0
+    said = json.loads(out)
+    assert said["method"] == name
+    assert said["same points from the pins"]
+    assert said["position is the pulses"]
+    assert not said["timing rules broken"]
+
+
 LINES = {
     "negative": [(-5, -7), (0, 0)],
     "every sign": [(7, -3), (-20, 11)],
@@ -222,6 +274,7 @@ def test_lines(discreta, start, end, normalize, preload):
     words = [",".join(map(str, point)) for point in (start, end)]
     code, out, err = discreta(
         *("simulate", "line", "--start", words[0], "--end", words[1], "--width", 5),
+        *BY_LINEAR,
         *("--preload", preload, "--normalize" if normalize else "--no-normalize"),
         *(*PYSIM, "--trace", "-"),
     )
@@ -259,7 +312,8 @@ PATHS = {
 @pytest.mark.parametrize(("points", "lost"), PATHS.values(), ids=PATHS)
 def test_points_that_come_twice(discreta, points, lost):
     write_csv("p.csv", points)
-    code, out, _ = discreta("simulate", "path", "p.csv", "--json", "-", "--trace", "t.csv", *PYSIM)
+    options = [*BY_LINEAR, *PYSIM, "--json", "-", "--trace", "t.csv"]
+    code, out, _ = discreta("simulate", "path", "p.csv", *options)
     assert code == 0
     _, rows = read_trace(Path("t.csv").read_text())
     assert [point for _, point in rows] == [
@@ -309,7 +363,18 @@ def test_arcs(discreta, start, end, degrees, direction, right_angles):
     words = [",".join(map(str, point)) for point in (start, end, center)]
     code, out, err = discreta(
         *("simulate", "arc", "--start", words[0], "--end", words[1], "--center", words[2]),
-        *("--direction", direction, "--turns", turns, "--width", 6, *PYSIM, "--trace", "-"),
+        *(
+            "--direction",
+            direction,
+            "--turns",
+            turns,
+            "--width",
+            6,
+            *BY_CIRCULAR,
+            *PYSIM,
+            "--trace",
+            "-",
+        ),
     )
     assert code == 0
     axes, rows = read_trace(out)
@@ -351,7 +416,7 @@ SETTINGS = [
 @pytest.mark.parametrize(("options", "choices"), SETTINGS)
 def test_settings_of_arcs(discreta, options, choices):
     """What is given comes before the setting, and the setting before the default."""
-    code, out, err = discreta(*ARC, "--width", 5, *options, *PYSIM, "--trace", "-")
+    code, out, err = discreta(*ARC, *BY_CIRCULAR, "--width", 5, *options, *PYSIM, "--trace", "-")
     assert code == 0
     steps = list(arc_steps((20, 0, 0, 20, 0, 0, 0, 0), width=5, **choices))
     assert read_trace(out)[1] == [(0, (20, 0)), *steps]
@@ -362,7 +427,7 @@ def test_settings_of_arcs(discreta, options, choices):
 
 
 def test_a_setting_of_lines(discreta):
-    line = [*LINE, *PYSIM, "--width", "5", "--trace", "-", "--setting", "lecture"]
+    line = [*LINE, *BY_LINEAR, *PYSIM, "--width", "5", "--trace", "-", "--setting", "lecture"]
     for options, preload in (([], "zero"), (["--preload", "half"], "half")):
         steps = path_steps([(0, 0), (20, 9)], width=5, normalize=False, preload=preload)
         assert read_trace(discreta(*line, *options)[1])[1] == [(0, (0, 0)), *steps]
@@ -416,7 +481,7 @@ def test_both_engines_draw_an_arc_the_same(discreta, folder):
 
 def test_a_circle_and_a_line_of_the_second_order(discreta):
     """Every step of a circle as an arc, and of a line as a line, from the documents."""
-    options = ["--width", 8, *PYSIM, "--trace", "-"]
+    options = [*BY_CONIC, "--width", 8, *PYSIM, "--trace", "-"]
     # From an axis three changes of direction lie ahead, from between them four.
     for direction, guard, start, turns in (("ccw", 2, (100, 0), 3), ("cw", 0, (60, 80), 4)):
         point = "{},{}".format(*start)
@@ -509,7 +574,7 @@ def test_both_engines_draw_a_conic_the_same(discreta, folder):
     said = {}
     for engine in ("pysim", "compiled"):
         files = ["--trace", f"{engine}.csv", "--plot", f"{engine}.png", "--json", "-"]
-        options = ["--width", 6, "--setting", "lecture", "--engine", engine]
+        options = [*BY_CONIC, "--width", 6, "--setting", "lecture", "--engine", engine]
         code, out, _ = discreta(*BEZIER[:-1], "45,30", *options, *files)
         assert code == 0
         said[engine] = json.loads(out)
@@ -524,7 +589,7 @@ def test_both_engines_draw_a_conic_the_same(discreta, folder):
 
 
 def test_the_summary_and_the_waveform_of_a_conic(discreta, folder):
-    code, out, _ = discreta(*CIRCLE, "--width", 5, "--json", "-", "--vcd", "w.vcd")
+    code, out, _ = discreta(*CIRCLE, *BY_CONIC, "--width", 5, "--json", "-", "--vcd", "w.vcd")
     assert code == 0
     keys = ["method", "width", "order", "preload", "guard", "engine", "clocks"]
     keys += ["summations", "steps", "clocks per step", "largest error", "largest error at"]
@@ -555,7 +620,7 @@ def test_only_data_on_the_standard_output(discreta):
 
 
 def test_the_summary_of_an_arc(discreta):
-    code, out, err = discreta(*ARC, *PYSIM, "--json", "-")
+    code, out, err = discreta(*ARC, *BY_CIRCULAR, *PYSIM, "--json", "-")
     assert code == 0
     keys = ["method", "width", "order", "normalize", "preload", "guard", "engine", "clocks"]
     keys += ["summations", "steps", "clocks per step", "largest error", "largest error at"]
@@ -565,7 +630,7 @@ def test_the_summary_of_an_arc(discreta):
 
 
 def test_the_waveform_of_an_arc_shows_every_register(discreta, folder):
-    code, _, _ = discreta(*ARC, "--width", 5, "--vcd", "w.vcd")
+    code, _, _ = discreta(*ARC, *BY_CIRCULAR, "--width", 5, "--vcd", "w.vcd")
     assert code == 0
     view = (folder / "w.gtkw").read_text()
     core = Circular(5)
@@ -585,7 +650,7 @@ def test_all_files_at_once(discreta, folder):
 
 
 def test_a_picture_is_the_same_whatever_the_order_of_options(discreta, folder):
-    line = [*LINE, *PYSIM, "--width", "6"]
+    line = [*LINE, *BY_LINEAR, *PYSIM, "--width", "6"]
     discreta(*line, "--plot", "a.svg", "--preload", "zero", "--no-normalize")
     discreta(*line, "--no-normalize", "--plot", "b.svg", "--preload", "zero")
     assert (folder / "a.svg").read_bytes() == (folder / "b.svg").read_bytes()
@@ -649,6 +714,8 @@ def test_methods(discreta):
         assert method.summary in row
         assert method.error_bound in row
         assert method.clocks_per_step in row
+    marked = [row.split()[0] for row in rows if row.split()[1] == "default"]
+    assert marked == ["exact_line", "exact_arc", "exact_conic"]
 
 
 def test_version(discreta):
@@ -705,6 +772,36 @@ def test_survey(discreta):
         assert max(map(abs, map(int, line.split(",")))) < 16
         assert missed == "0"
     assert re.fullmatch(r"\d+ clocks of RTL in \d+\.\d s, \d+\.\d million a second", time_taken)
+
+
+@pytest.mark.usefixtures("compiled_engine")
+def test_survey_of_all_the_exact_ones(discreta, monkeypatch):
+    def few(method, width):
+        chosen = survey_groups(method, width)[:1]
+        return [
+            Group(group.title, group.blocks[-9:], group.answers[-9:], group.lengths[-9:])
+            for group in chosen
+        ]
+
+    monkeypatch.setattr("discreta.sim.groups.survey_groups", few)
+    code, out, err = discreta("survey", "exact", "comparison", "--width", "4")
+    assert (code, err) == (0, "")
+    titles = [line.split(",")[0] for line in out.splitlines() if "width 4" in line]
+    assert titles == ["exact_line", "exact_arc", "exact_conic", "comparison"]
+
+
+def test_prove_all_the_exact_ones(discreta, monkeypatch):
+    def prove_variant(name, width, variant):
+        assert variant == {}
+        return [Verdict(f"{name} ends at {width}", True, 0.5, "")]
+
+    monkeypatch.setattr("discreta.sim.prover.prove_variant", prove_variant)
+    monkeypatch.setattr(cli, "ProcessPoolExecutor", ThreadPoolExecutor)
+    code, out, err = discreta("prove", "exact", "--width", "5")
+    assert (code, err) == (0, "")
+    assert out.splitlines()[::2][:3] == [
+        f"{name}, width 5" for name in ("exact_line", "exact_arc", "exact_conic")
+    ]
 
 
 def test_prove(discreta, monkeypatch):
@@ -793,7 +890,7 @@ class Silent(Standing):
 def test_an_end_that_is_not_reached(discreta, monkeypatch, folder):
     """Exit 1, with everything written: that is where to look for why."""
     monkeypatch.setitem(METHODS, "linear", replace(METHODS["linear"], device=Standing))
-    code, out, err = discreta(*LINE, *PYSIM, "--trace", "t.csv")
+    code, out, err = discreta(*LINE, *BY_LINEAR, *PYSIM, "--trace", "t.csv")
     assert (code, err) == (1, "")
     assert table(out)["end point reached"] == "no"
     assert table(out)["support points hit"] == "0"
@@ -802,7 +899,7 @@ def test_an_end_that_is_not_reached(discreta, monkeypatch, folder):
 
 def test_a_device_that_does_not_answer(discreta, monkeypatch, folder):
     monkeypatch.setitem(METHODS, "linear", replace(METHODS["linear"], device=Silent))
-    code, out, err = discreta(*LINE, *PYSIM, "--trace", "t.csv")
+    code, out, err = discreta(*LINE, *BY_LINEAR, *PYSIM, "--trace", "t.csv")
     assert (code, out) == (1, "")
     # 32 summations, and some clocks around them.
     message = r"discreta: 0 of 1 blocks are answered after (\d+) clocks, where \1 must do\n"
@@ -854,11 +951,12 @@ BAD = {
     ),
     "a speed without a carrier": (
         [*LINE, "--speed", "1"],
-        "--speed is no option of linear, which has no carrier: leave it out",
+        "--speed is no option of exact_line, which has no carrier: choose --method carrier_linear",
     ),
     "a period without a carrier": (
         [*ARC, "--period", "200"],
-        "--period is no option of circular, which has no carrier: leave it out",
+        "--period is no option of exact_arc, which has no carrier: choose --method "
+        "carrier_circular",
     ),
     "a formula of a line": (
         [*TIMED_LINE, "--formula", "plain"],
@@ -979,15 +1077,80 @@ BAD = {
         f"method circular draws arcs and no lines: choose {OF_LINES}",
     ),
     "setting": (
-        [*LINE, "--setting", "book"],
+        [*LINE, *BY_LINEAR, "--setting", "book"],
         "--setting book: choose default or lecture for linear",
     ),
     "setting of Verilog": (
         ["verilog", "circular", "--setting", ""],
         "--setting : choose default or lecture for circular",
     ),
+    "the lecture's lines by the default method": (
+        [*LINE, "--setting", "lecture"],
+        "exact_line has no setting 'lecture': add --method linear",
+    ),
+    "the lecture's path by the default method": (
+        [*PATH_OF, "good.csv", "--setting", "lecture"],
+        "exact_line has no setting 'lecture': add --method linear",
+    ),
+    "the lecture's arcs by the default method": (
+        [*ARC, "--setting", "lecture"],
+        "exact_arc has no setting 'lecture': add --method circular",
+    ),
+    "the lecture's conics by the default method": (
+        [*CIRCLE, "--setting", "lecture"],
+        "exact_conic has no setting 'lecture': add --method conic",
+    ),
+    "another method's setting and option": (
+        [*LINE, "--form", "signed", "--setting", "lecture"],
+        "exact_line has no setting 'lecture': add --method comparison",
+    ),
+    "preload of the default method": (
+        [*LINE, "--preload", "zero"],
+        "exact_line has no option --preload: add --method linear",
+    ),
+    "no normalize of the default method": (
+        [*ARC, "--no-normalize"],
+        "exact_arc has no option --normalize: add --method circular",
+    ),
+    "guard of the default method": (
+        [*CIRCLE, "--guard", "0"],
+        "exact_conic has no option --guard: add --method conic",
+    ),
+    "an option that no method of lines has": (
+        [*LINE, "--guard", "0"],
+        "--guard is no option of exact_line, which has none: leave it out",
+    ),
+    "a setting that no method of lines has": (
+        [*LINE, "--setting", "book"],
+        "--setting book: choose default for exact_line",
+    ),
+    "the lecture's exact lines": (
+        [*LINE, "--method", "exact", "--setting", "lecture"],
+        "--setting lecture: choose default for exact_line",
+    ),
+    "three axes by a method of two": (
+        [*LINE, "--start", "0,0,0", "--end", "1,2,3", "--method", "comparison"],
+        "the line has 3 axes and method comparison 2: choose exact_line or linear",
+    ),
+    "exact Verilog": (
+        ["verilog", "exact"],
+        "Invalid value for 'METHOD': there is no method 'exact': choose "
+        f"{' or '.join([*METHODS, *UNITS])}",
+    ),
+    "whole degrees of exact arcs": (
+        ["survey", "exact_arc", "--whole-degrees"],
+        "exact_arc has no arcs between whole degrees: survey circular",
+    ),
+    "whole degrees of lines and arcs": (
+        ["survey", "circular", "linear", "--whole-degrees"],
+        "there are no lines between whole degrees: survey circular",
+    ),
+    "width of all the exact ones": (
+        ["prove", "exact", "--width", "32"],
+        "--width 32: exact_conic has up to 24 bits: choose 4 to 24",
+    ),
     "order of lines": (
-        [*LINE, "--order", "alternated"],
+        [*LINE, *BY_LINEAR, "--order", "alternated"],
         "--order is no option of linear, which has --normalize and --preload: leave it out",
     ),
     "guard of lines": (
@@ -1151,15 +1314,15 @@ BAD = {
     ),
     "conic with a method for arcs": (
         [*CIRCLE, "--method", "circular"],
-        "method circular draws arcs and no conics: choose conic or exact_conic",
+        "method circular draws arcs and no conics: choose exact_conic or conic",
     ),
     "normalize of conics": (
-        [*CIRCLE, "--no-normalize"],
+        [*CIRCLE, *BY_CONIC, "--no-normalize"],
         "--normalize is no option of conic, which has --order and --preload and --guard: leave it "
         "out",
     ),
     "order of arcs": (
-        [*ARC, "--order", "implicit"],
+        [*ARC, *BY_CIRCULAR, "--order", "implicit"],
         "--order implicit: choose alternated or simultaneous for circular",
     ),
     # Points

@@ -13,6 +13,7 @@ from discreta.sim.conics import KINDS, random_blocks
 from discreta.sim.contour import (
     ArcContour,
     ConicContour,
+    ExactConicContour,
     LineContour,
     distance_from_circle,
     distance_from_line,
@@ -378,3 +379,19 @@ def test_columns_behind_those_of_a_curve_are_its_timing():
     assert contour.errors(np.array([[4, -3]]), np.array([0])).tolist() == [5]
     arcs = np.array([[3, 4, 5, 0, 0, 0, 0, 0, 7, 200]])
     assert ArcContour(arcs).errors(np.array([[0, 7]]), np.array([0])).tolist() == [2]
+
+
+def test_the_end_of_an_exact_conic_is_not_counted():
+    """A circle of radius 5, to an end that is a step off it, beyond one that is half as far."""
+    block = np.array([[1, 0, 1, 0, 0, 5, 0, 4, 5, 0, 0]])
+    moves = [[0, 1], [0, 1], [0, 1], [-1, 1], [0, 1]]
+    stretch = Stretch(7, 1, 1, events_of([moves], 2), np.empty((0, 0), dtype=np.int64))
+    counted, exact = ConicContour(block), ExactConicContour(block)
+    for contour in (counted, exact):
+        contour.follow(stretch)
+        assert contour.reached.all()
+        assert contour.steps == len(moves)
+    assert counted.largest_error == pytest.approx(sqrt(41) - 5)
+    assert counted.error_at == (4, 5)
+    assert exact.largest_error == pytest.approx(sqrt(34) - 5)
+    assert exact.error_at == (5, 3)

@@ -16,6 +16,7 @@ from tests.arcs import fault, on_curve, quadrant_after, seen
 from tests.conics import derivatives
 
 LINES, ARCS, CONICS = METHODS["linear"], METHODS["circular"], METHODS["conic"]
+EXACT_ARCS, EXACT_CONICS = METHODS["exact_arc"], METHODS["exact_conic"]
 
 
 @pytest.mark.parametrize("width", [4, 8, 9, 10, 19])
@@ -392,3 +393,49 @@ def test_whole_degrees_need_eight_bits_and_arcs():
         whole_degrees(ARCS, 7)
     with pytest.raises(ValueError, match="there are no lines between"):
         whole_degrees(LINES, 8)
+
+
+@pytest.mark.parametrize("width", [4, 8, 12])
+def test_exact_arcs(monkeypatch, width):
+    """Every circle, and arcs that have room: of 12 bits those of the issue, here some of them."""
+    assert groups._EXACT_ARCS == {12: 2_000_000}
+    monkeypatch.setitem(groups._EXACT_ARCS, 12, 100_000)
+    quarters, circles, turns, arcs = survey_groups(EXACT_ARCS, width)
+    top = 2**width - 1
+    assert quarters.title == f"all {top} quarter arcs"
+    assert circles.title == f"all {top} circles"
+    assert turns.title == f"ten turns of {len(turns.blocks)} circles"
+    assert sorted(circles.blocks[:, 0].tolist()) == list(range(1, top + 1))
+    np.testing.assert_array_equal(circles.blocks[:, :2], circles.blocks[:, 2:4])
+    np.testing.assert_array_equal(quarters.blocks[:, [0, 1]], quarters.blocks[:, [3, 2]])
+    count = {12: 100_000}.get(width, 1 << 16)
+    assert arcs.title == f"a sample (seed {SEED}) of {count} arcs"
+    start, end = arcs.blocks[:, :2] - arcs.blocks[:, 4:6], arcs.blocks[:, 2:4] - arcs.blocks[:, 4:6]
+    radius, reached = np.hypot(*start.T), np.hypot(*end.T)
+    assert radius.max() == pytest.approx(2800 / 4096 * 2**width, abs=1)
+    # Off the circle by the rounding of the end alone.
+    assert 0.4 < np.abs(reached - radius).max() <= sqrt(0.5)
+    assert set(arcs.blocks[:, 6]) == {0, 1}
+    # Room for the whole circle.
+    assert (np.abs(arcs.blocks[:, 4:6]) + radius[:, None]).max() < 2**width
+    for group in (quarters, circles, turns, arcs):
+        assert not group.answers.any()
+        assert (group.lengths > 0).all()
+
+
+def test_whole_turned_ellipses(monkeypatch):
+    """More than 400 of them, closed, of any angle, in both directions; of no other method."""
+    monkeypatch.setattr(groups, "_CURVES", 20)
+    title = "512 whole turned ellipses"
+    (group,) = [g for g in survey_groups(EXACT_CONICS, 8) if "whole" in g.title]
+    assert group.title == title
+    assert not any("whole" in g.title for g in survey_groups(CONICS, 8))
+    blocks = group.blocks
+    assert len(np.unique(blocks, axis=0)) == 512
+    np.testing.assert_array_equal(blocks[:, 5:7], blocks[:, 7:9])
+    a, b, c = blocks[:, :3].T
+    assert (4 * a * c > b * b).all()
+    assert (b != 0).mean() > 0.9
+    assert set(blocks[:, 9]) == {0, 1}
+    assert set(blocks[:, 10]) == {4}
+    assert (group.lengths > 0.3 * 255).all()

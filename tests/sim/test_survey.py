@@ -525,6 +525,26 @@ def test_arcs_that_are_refused_and_must_not_be(monkeypatch):
     assert (row.blocks, row.ends_missed) == (31, 31)
 
 
+@pytest.mark.usefixtures("compiled_engine", "one_process")
+def test_an_error_above_the_proven_bound_is_reported(monkeypatch):
+    """As if the lecture's arcs and lines were promised to be exact."""
+    monkeypatch.setattr(module, "REGISTER_BUDGET", 0)
+    exact = METHODS["exact_arc"]
+    arcs = replace(
+        exact, device=Circular, clocks=lambda golden, blocks: 9 * exact.clocks(golden, blocks)
+    )
+    for method, bound in ((arcs, 0.5), (LINES, 0.69)):
+        choices = {name: values[:1] for name, values in method.choices.items()}
+        changed = replace(method, name="Worse", choices=choices, bound=lambda _, most=bound: most)
+        monkeypatch.setitem(METHODS, "Worse", changed)
+        row = row_of(changed, 6, survey_groups(method, 6)[:1])
+        assert row.largest_error > bound
+        assert not row.good
+        assert not row.ends_missed
+        said = rf"the error is {row.largest_error:.4f} at -?\d+,-?\d+, where {bound:.4f} is proven"
+        assert [re.fullmatch(said, finding) is None for finding in row.findings] == [False]
+
+
 def test_parts_of_a_row_add_up():
     row = SurveyRow({}, 0, blocks=2, clocks=30, largest_error=0.5, error_index=4, error_at=(1, 2))
     row.add(SurveyRow({}, 0, blocks=1, clocks=9, largest_error=0.7, error_index=9, error_at=(5, 6)))
