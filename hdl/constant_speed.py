@@ -92,7 +92,7 @@ class ConstantSpeed(Part):
     ``ticks`` is not what the arc takes.
 
     Source: design of the exact interpolator (a timer modulo R or L, started at half, decides when
-    the leading axis steps). That rule gives up half a step at every change of octant, and was 3.4
+    the leading axis steps). That rule gives up half a step at every change of octant, and was 3
     steps off on a circle of R = 100; so an arc is timed by area here.
 
     Parameters
