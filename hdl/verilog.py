@@ -92,6 +92,8 @@ _MEANINGS = {
     "blocks_full_turns": "block: whole turns made before the arc itself",
     "blocks_periods": "block: carrier periods that it takes, N",
     "blocks_period": "block: clocks of a carrier period, T",
+    "blocks_pace": "block: line: length/L - 1 in 2^-(n + 12); arc: R in 2^-12; 0 full speed",
+    "blocks_ticks": "block: ticks that the arc takes, R*angle or the longest further way",
     "blocks_turns": "block: changes of direction of an axis on the way",
     **{f"blocks_{letter}": f"block: coefficient {letter.upper()}" for letter in "abcde"},
     "error": "why a block was not run; "
