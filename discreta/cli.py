@@ -46,6 +46,7 @@ from discreta.sim.carrier import DEFAULT_PERIOD, DEFAULT_SPEED, MAX_PERIOD
 from discreta.sim.compiled import compiler
 from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
 from discreta.sim.curves import Arc, Conic, Curve, Polyline
+from discreta.sim.gcode import IGNORABLE, SUFFIXES, is_gcode, read_moves
 from discreta.sim.machine import Drive
 from discreta.sim.methods import DEFAULTS, METHODS, Design, Method
 from discreta.sim.outputs import Outputs
@@ -59,6 +60,7 @@ from discreta.sim.points import (
     read_points,
     say_point,
 )
+from discreta.sim.program import CORES, Program, run_program, speeds
 from discreta.sim.run import run, say_choices
 from discreta.sim.simulate import ENGINES, DeadCoreError, default_engine
 from discreta.sim.synth import (
@@ -132,16 +134,21 @@ class _Numbers(click.ParamType):
 
 
 class _Speed(click.ParamType):
-    """A speed: a number more than 0, a whole one, a decimal or a fraction."""
+    """A speed: a number more than 0, a whole one, a decimal or a fraction. Or another such one."""
 
     name = "F"
 
+    def __init__(self, what: str = "a speed", unit: str = "steps per clock"):
+        self._what, self._unit = what, unit
+
     def convert(self, value: Any, param: Any, ctx: Any) -> Fraction:
         if not _NUMBER.fullmatch(value):
-            self.fail(f"{value!r} is not a speed: give a number like 0.1 or 1/10", param, ctx)
+            self.fail(f"{value!r} is not {self._what}: give a number like 0.1 or 1/10", param, ctx)
         speed = Fraction(value)
         if speed <= 0:
-            self.fail(f"{value} steps per clock are no speed: choose more than 0", param, ctx)
+            self.fail(
+                f"{value} {self._unit} are no {self._what[2:]}: choose more than 0", param, ctx
+            )
         return speed
 
 
@@ -394,6 +401,68 @@ _drive_options = _options(
 )
 
 
+class _StepsPerMm(click.ParamType):
+    """Steps a millimetre: a number for all axes, or one for each."""
+
+    name = "N|x=N,y=N,z=N"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[Fraction, ...]:
+        cells = value.lower().replace(" ", "").split(",")
+        if len(cells) == 1 and "=" not in value:
+            cells = [f"{letter}={value}" for letter in "xyz"]
+        given = dict(cell.split("=", 1) for cell in cells if "=" in cell)
+        numbers = [given.get(letter, given.get("y", "")) for letter in "xyz"]
+        if len(given) != len(cells) or set(given) not in ({"x", "y"}, {"x", "y", "z"}):
+            numbers = [""]
+        if not all(_NUMBER.fullmatch(number) and Fraction(number) > 0 for number in numbers):
+            self.fail(
+                f"{value!r} is not steps a mm: give a number more than 0 for all axes, like 80, or "
+                "one for each, like x=80,y=80,z=400",
+                param,
+                ctx,
+            )
+        return tuple(Fraction(number) for number in numbers)
+
+
+class _Words(click.ParamType):
+    """Words of G-code that are to be ignored."""
+
+    name = "WORD,…"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> frozenset[str]:
+        words = frozenset(word.strip().upper() for word in value.split(","))
+        for word in sorted(words - set(IGNORABLE)):
+            self.fail(f"{word!r} cannot be ignored: choose of {','.join(IGNORABLE)}", param, ctx)
+        return words
+
+
+_GCODE = ("steps_per_mm", "clock", "rapid", "ignore")
+_gcode_options = _options(
+    click.option(
+        "--steps-per-mm",
+        type=_StepsPerMm(),
+        help="G-code: steps a millimetre, of all axes or of each.",
+    ),
+    click.option(
+        "--clock",
+        type=_Speed("a clock", "MHz"),
+        metavar="MHZ",
+        help="G-code: run on the whole device, whose clock this is, at the speeds of F.",
+    ),
+    click.option(
+        "--rapid",
+        type=_Speed("a speed", "mm a minute"),
+        metavar="SPEED",
+        help="G-code: speed of G0, in mm a minute.",
+    ),
+    click.option(
+        "--ignore",
+        type=_Words(),
+        help=f"G-code: what may be left out of {','.join(IGNORABLE)}, like M3,M5,S.",
+    ),
+)
+
+
 def _run_options(curve: str, width: Callable = _width) -> Callable:
     return _options(
         _drive_options,
@@ -555,19 +624,78 @@ def simulate_line(start: tuple[int, ...], end: tuple[int, ...], width: int, **op
 
 
 @simulate_group.command("path")
-@click.argument("file", metavar="FILE.csv")
+@click.argument("file", metavar="FILE")
+@_gcode_options
 @_run_options("line")
 @_timing_options
 def simulate_path(file: str, width: int, **options: Any) -> None:
-    """Run a polyline of support points without a gap.
+    """Run a polyline or a program in G-code.
 
-    FILE.csv has a header with the axis letters (x,y and so on) and a support point in every row, in
-    steps. A path whose last point is its first is closed. A point that repeats the one before it
-    takes a clock or two and no step. Exits 1 when a point is missed.
+    A CSV FILE has a header with the axis letters (x,y and so on) and a support point in every row,
+    in steps, which are run without a gap. A path whose last point is its first is closed. A point
+    that repeats the one before it takes a clock or two and no step. Exits 1 when a point is missed.
+
+    A FILE whose name ends in .ngc, .nc, .gcode or .tap has G-code, in mm or inches, and needs
+    --steps-per-mm. Its lines run on exact_line and its arcs on exact_arc; with --clock on the whole
+    device, at the speeds that F says. What is not understood is refused with file and line. So:
+    discreta simulate path examples/plate.ngc --steps-per-mm 80 --plot plate.svg
 
     Example: discreta simulate path examples/bulgaria.csv --plot border.svg
     """
+    program = {name: options.pop(name) for name in _GCODE}
+    if is_gcode(file):
+        _simulate_program(file, width, program, options)
+        return
+    for name, value in program.items():
+        if value:
+            raise BadInputError(
+                f"--{name.replace('_', '-')} goes with G-code, and {file} is read as CSV: leave it "
+                f"out, or name a file that ends in {', '.join(SUFFIXES)}"
+            )
     _simulate(Polyline(read_points(file, width)), width=width, reads=(file,), **options)
+
+
+def _simulate_program(
+    file: str, width: int, program: dict[str, Any], options: dict[str, Any]
+) -> None:
+    """Run a program in G-code."""
+    for name in (*_CHOICES, "speed", "period", "feed"):
+        if options.pop(name) is not None:
+            why = "the speed is that of F and --rapid" if name == "feed" else "its cores have none"
+            raise BadInputError(f"--{name} does not go with G-code, {why}: leave it out")
+    if options.pop("setting") != "default" or options.pop("method") not in (None, CORES["line"]):
+        raise BadInputError(
+            f"G-code runs on {' and '.join(core.name for core in CORES.values())}: leave out "
+            "--method and --setting"
+        )
+    steps_per_mm, clock, rapid = (program[name] for name in ("steps_per_mm", "clock", "rapid"))
+    if steps_per_mm is None:
+        raise BadInputError(
+            f"{file} is in mm or inches: give --steps-per-mm, like --steps-per-mm 80"
+        )
+    moves = read_moves(file, steps_per_mm, width, program["ignore"] or ())
+    device = {name: options.pop(name) for name in ("accel", "pulse")} | {"feed": None}
+    asked = [
+        f"--{name}"
+        for name in ("rapid", "accel", "pulse", "plotter", "screen")
+        if (program | device | options)[name] is not None
+    ]
+    if clock is None and asked:
+        raise BadInputError(
+            f"{asked[0]} goes with the whole device, which turns mm a minute into clocks: give "
+            "--clock, too"
+        )
+    drive, feeds = None, []
+    if clock is not None:
+        try:
+            feeds = speeds(moves, clock * 10**6, rapid)
+        except BadInputError as error:
+            raise BadInputError(f"{file}, {error}") from None
+        drive = _drive(device | {"feed": max(feeds)}, options)
+    _run_shown(
+        partial(run_program, Program(moves), width=width, drive=drive, feeds=feeds, reads=(file,)),
+        options,
+    )
 
 
 @simulate_group.command("arc")
@@ -726,6 +854,11 @@ def _simulate(curve: Curve, *, method: Method | None, setting: str, **options: A
     choices = _chosen(method, setting, given)
     _check_width(method, options["width"])
     drive = _drive({name: options.pop(name) for name in _DRIVE}, options)
+    _run_shown(partial(run, curve, method, drive=drive, **choices), options)
+
+
+def _run_shown(run_it: Callable[..., dict[str, Any]], options: dict[str, Any]) -> None:
+    """Run something under a progress bar and print its summary; exit 1 when an end is missed."""
     trace, vcd = options["trace"], options["vcd"]
     # Without a word the run would only seem slow.
     slow = options["engine"] is None and vcd is None and default_engine() == "pysim"
@@ -740,7 +873,7 @@ def _simulate(curve: Curve, *, method: Method | None, setting: str, **options: A
             show(done, total)
 
         began = time.perf_counter()
-        summary = run(curve, method, progress=progress, drive=drive, **options, **choices)
+        summary = run_it(progress=progress, **options)
         seconds = time.perf_counter() - began
     _print_summary(summary, seconds, err="-" in (trace, options["summary_file"]))
     if not summary["end point reached"]:

@@ -12,29 +12,46 @@ from discreta.sim.contour import ArcContour, ConicContour, Contour, LineContour
 from discreta.sim.pace import Pace
 from discreta.sim.points import check_arc, check_path
 
-__all__ = ["Arc", "Conic", "Curve", "Polyline"]
+__all__ = ["Arc", "Conic", "Curve", "Drawn", "Polyline"]
 
 #: Points of a whole circle in a picture, and of the piece of one in a window.
 _ROUND, _NEAR = 1 << 12, 1 << 10
 
 
-class Curve(Protocol):
-    """What :func:`~discreta.sim.run.run` runs.
+class Drawn(Protocol):
+    """What a picture shows the steps of.
 
     Attributes
     ----------
-    kind : str
-        What its blocks are, as of :class:`~discreta.sim.methods.Method`.
     axes : int
     """
 
-    kind: str
     axes: int
 
     @property
     def start(self) -> np.ndarray:
         """Give where it begins, shape (axes,), in steps."""
         ...
+
+    def outline(self) -> np.ndarray:
+        """Give the true curve as a polyline, shape (points, axes), in steps, fine for a picture."""
+        ...
+
+    def near(self, point: np.ndarray, reach: float, /) -> np.ndarray:
+        """Give what of the curve lies up to ``reach`` steps from a point, as such a polyline."""
+        ...
+
+
+class Curve(Drawn, Protocol):
+    """What :func:`~discreta.sim.run.run` runs.
+
+    Attributes
+    ----------
+    kind : str
+        What its blocks are, as of :class:`~discreta.sim.methods.Method`.
+    """
+
+    kind: str
 
     @property
     def blocks(self) -> np.ndarray:
@@ -51,14 +68,6 @@ class Curve(Protocol):
 
     def facts(self, contour: Contour, pace: Pace | None, /) -> dict[str, Any]:
         """Give what the summary says of this kind of curve alone; no pace on a carrier."""
-        ...
-
-    def outline(self) -> np.ndarray:
-        """Give the true curve as a polyline, shape (points, axes), in steps, fine for a picture."""
-        ...
-
-    def near(self, point: np.ndarray, reach: float, /) -> np.ndarray:
-        """Give what of the curve lies up to ``reach`` steps from a point, as such a polyline."""
         ...
 
 

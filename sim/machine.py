@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from hashlib import sha256
 from math import ceil, sqrt
-from typing import IO, Any
+from typing import IO, Any, Protocol
 
 import numpy as np
 
@@ -27,7 +27,16 @@ from discreta.sim.points import BadInputError
 from discreta.sim.simulate import simulate
 from discreta.sim.stretch import EVENT_COLUMNS
 
-__all__ = ["Drive", "Machine", "Trail", "device_blocks", "pace_limit"]
+__all__ = [
+    "BlocksOfAKind",
+    "Drive",
+    "Machine",
+    "Trail",
+    "device_blocks",
+    "pace_limit",
+    "pace_limit_of",
+    "path_of",
+]
 
 #: Clocks of a run beside all others: the queue's, the feed unit's, the last pulse's.
 _OVERHEAD = 64
@@ -87,9 +96,40 @@ class Drive:
         }
 
 
+class BlocksOfAKind(Protocol):
+    """Blocks of one kind, as curves have them."""
+
+    @property
+    def kind(self) -> str:
+        """Give their kind."""
+        ...
+
+    @property
+    def axes(self) -> int:
+        """Give how many axes there are."""
+        ...
+
+    @property
+    def start(self) -> np.ndarray:
+        """Give where the first one begins."""
+        ...
+
+    @property
+    def blocks(self) -> np.ndarray:
+        """Give what the interpolator is given, shape (blocks, block fields)."""
+        ...
+
+
+def path_of(device: Device, curve: BlocksOfAKind) -> np.ndarray:
+    """Give how long every block is as a device measures it, shape (blocks,)."""
+    if isinstance(device.interpolators[curve.kind], ConstantSpeed):
+        return ticks_of(curve.kind, curve.blocks, curve.axes)
+    return octagon(curve.blocks, curve.kind)
+
+
 def device_blocks(
     device: Device,
-    curve: Curve,
+    curve: BlocksOfAKind,
     drive: Drive,
 ) -> np.ndarray:
     """Give what a device is given for a curve, shape (1 + blocks, block fields).
@@ -97,23 +137,22 @@ def device_blocks(
     The first block tells it where the machine stands: at the start of the curve.
     """
     interpolator = device.interpolators[curve.kind]
+    own = curve.blocks
     if isinstance(interpolator, ConstantSpeed):
         own = paced(curve.kind, curve.blocks, device.width, curve.axes)
-        path = ticks_of(curve.kind, curve.blocks, curve.axes)
-    else:
-        own, path = curve.blocks, octagon(curve.blocks, curve.kind)
     columns = dict(zip(block_fields(interpolator), own.T, strict=True))
     mantissa, exponent = encode_feed(drive.feed)
     columns |= {
         "blocks_kind": np.full(len(curve.blocks), KINDS[curve.kind].value),
         "blocks_feed_mantissa": np.full(len(curve.blocks), mantissa),
         "blocks_feed_exponent": np.full(len(curve.blocks), exponent),
-        "blocks_ahead": ahead(path),
+        "blocks_ahead": ahead(path_of(device, curve)),
     }
     fields = block_fields(device)
     blocks = np.zeros((1 + len(curve.blocks), len(fields)), dtype=np.int64)
     for index, name in enumerate(fields):
-        blocks[1:, index] = columns[name]
+        # What only blocks of another kind have is left alone.
+        blocks[1:, index] = columns.get(name, 0)
     letters = AXIS_LETTERS[: curve.axes]
     place = {"blocks_kind": BlockKind.__members__["PLACE"].value}
     place |= {f"blocks_end_{a}": value for a, value in zip(letters, curve.start, strict=True)}
@@ -125,16 +164,27 @@ def device_blocks(
 def pace_limit(curve: Curve, drive: Drive, interpolator_clocks: int) -> int:
     """Give the most clocks that a curve may take on the device."""
     path = float(octagon(curve.blocks, curve.kind).sum())
-    feed, acceleration = float(drive.programmed), float(drive.acceleration)
+    feed = float(drive.programmed)
+    return pace_limit_of(path, path / feed, feed, len(curve.blocks), drive, interpolator_clocks)
+
+
+def pace_limit_of(
+    path: float, pauses: float, feed: float, blocks: int, drive: Drive, interpolator_clocks: int
+) -> int:
+    """Give the most clocks for a path of so many steps, pauses of so many clocks and blocks.
+
+    ``feed`` is the highest speed, in steps per clock.
+    """
+    acceleration = float(drive.acceleration)
     # Where both axes step, but not in turns, the pauses are longer than the path is by the octagon.
-    clocks = sqrt(2) * path / feed
+    clocks = sqrt(2) * pauses
     if acceleration:
         # Up from a standstill and down, or half of the way each.
         clocks += 2 * min(feed / acceleration, sqrt(2 * max(path, 1) / acceleration))
         clocks += 4 * sqrt(2 / acceleration)
     # Every step with a turn of direction, one axis at a time.
     period = sum(max(1, value) for value in vars(drive.timing).values()) + 4
-    clocks += sqrt(2) * path * period + _HAND_OVER * len(curve.blocks) + _OVERHEAD + period
+    clocks += sqrt(2) * path * period + _HAND_OVER * blocks + _OVERHEAD + period
     return ceil(clocks) + interpolator_clocks
 
 
@@ -176,11 +226,14 @@ class Trail:
 class Machine:
     """A curve on a device with one interpolator, and what a virtual machine makes of its pins.
 
+    A machine of several kinds of blocks overrides :meth:`blocks` and :attr:`length`.
+
     Parameters
     ----------
     curve : Curve
-    interpolator : Part
-        Of a method that draws such curves; an exact line or arc runs at constant speed here.
+        Of a machine of several kinds its ``start`` and ``axes`` are enough.
+    interpolators : dict of str to Part
+        By kind; of methods that draw such curves. An exact line or arc runs at constant speed here.
     drive : Drive
     expected : Trail
         The points of the interpolator alone.
@@ -198,10 +251,14 @@ class Machine:
         Run so far.
     """
 
-    def __init__(self, curve: Curve, interpolator: Part, drive: Drive, expected: Trail):
-        if isinstance(interpolator, (ExactLine, ExactArc)):
-            interpolator = ConstantSpeed(interpolator)
-        self.device = Device(**{curve.kind: interpolator})
+    def __init__(self, curve: Any, interpolators: dict[str, Part], drive: Drive, expected: Trail):
+        exact = (ExactLine, ExactArc)
+        self.device = Device(
+            **{
+                kind: ConstantSpeed(part) if isinstance(part, exact) else part
+                for kind, part in interpolators.items()
+            }
+        )
         self.plotter = Plotter(curve.start, drive.timing, keep_moves=False)
         self.pen = Pen(curve.start)
         self.screen = Screen(curve.start, expected.low, expected.high)
@@ -213,15 +270,23 @@ class Machine:
         self._reason = 0
         self._position = curve.start
 
+    def blocks(self) -> np.ndarray:
+        """Give what the device is given."""
+        return device_blocks(self.device, self._curve, self._drive)
+
+    @property
+    def length(self) -> float:
+        """Give the true curve's length, in steps."""
+        return float(lengths(self._curve.kind, self._curve.blocks).sum())
+
     def run(
         self, *, limit: int, engine: str, vcd: IO[str] | None = None
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Run the curve; give clocks, from the first block on, and points of the pins' moves."""
-        blocks = device_blocks(self.device, self._curve, self._drive)
         letters = AXIS_LETTERS[: self._curve.axes]
         stretches = simulate(
             self.device,
-            blocks,
+            self.blocks(),
             limit=limit,
             engine=engine,
             watch=("reason", *(f"position_{a}" for a in letters)),
@@ -271,7 +336,7 @@ class Machine:
         the last pulse; speed, the true curve's length by them; pulses by axis; broken rules; the
         same points as of the interpolator alone.
         """
-        drive, length = self._drive, float(lengths(self._curve.kind, self._curve.blocks).sum())
+        drive, length = self._drive, self.length
         clocks = self._last - (self._accepted or 0)
         return {
             "feed": round(float(drive.programmed), 12),

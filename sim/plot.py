@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from discreta.hdl.contract import AXIS_LETTERS
-from discreta.sim.curves import Curve
+from discreta.sim.curves import Drawn
 from discreta.sim.points import BadInputError
 
 __all__ = ["FORMATS", "PathPlot", "picture_format"]
@@ -54,13 +54,13 @@ class PathPlot:
 
     Parameters
     ----------
-    curve : Curve
+    curve : Drawn
         The true path.
     periods : bool
         A point is where a whole period led: what it moved along both axes is drawn as well.
     """
 
-    def __init__(self, curve: Curve, *, periods: bool = False):
+    def __init__(self, curve: Drawn, *, periods: bool = False):
         self._curve = curve
         self._periods = periods
         self._seen = 1

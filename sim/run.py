@@ -29,7 +29,7 @@ from discreta.sim.points import BadInputError
 from discreta.sim.simulate import default_engine, simulate
 from discreta.sim.view import write_view
 
-__all__ = ["run", "say_choices"]
+__all__ = ["choose_engine", "run", "say_choices"]
 
 #: Clocks of a run beside those of its blocks: up to the first acceptance, and the last answer.
 _OVERHEAD = 2
@@ -125,16 +125,7 @@ def run(
             f"another, or leave out --feed, --accel, --pulse, --plotter and --screen"
         )
     curve.check(width)
-    if vcd is not None and (vcd == "-" or Path(vcd).is_char_device() or Path(vcd).is_fifo()):
-        raise BadInputError("--vcd needs a file: its .gtkw view goes beside it")
-    if vcd and engine == "compiled":
-        raise BadInputError("--vcd is written by pysim: leave out --engine compiled")
-    if trace == summary_file == "-":
-        raise BadInputError("--trace - and --json - would mix: send one of them to a file")
-    if engine is None:
-        engine = "pysim" if vcd else default_engine()
-    elif engine == "compiled" and default_engine() != "compiled":
-        raise BadInputError("--engine compiled needs a C++ compiler: install one or use pysim")
+    engine = choose_engine(engine, trace=trace, vcd=vcd, summary_file=summary_file)
     kind = picture_format("--plot", plot)
     plotter_kind, screen_kind = (
         picture_format("--plotter", plotter),
@@ -192,7 +183,7 @@ def run(
         pictured = f"{method.name}, {width} bits"
         machine: Machine | None = None
         if drive is not None:
-            machine = Machine(curve, core, drive, trail)
+            machine = Machine(curve, {curve.kind: core}, drive, trail)
             for when, reached in machine.run(limit=pace_at_most, engine=engine, vcd=vcd_file):
                 if rows:
                     rows.writerows(np.column_stack([when, reached]).tolist())
@@ -232,6 +223,27 @@ def run(
             json.dump(summary, json_file, indent=2)
             json_file.write("\n")
     return summary
+
+
+def choose_engine(
+    engine: str | None, *, trace: str | None, vcd: str | None, summary_file: str | None
+) -> str:
+    """Give the engine that can write what is asked for.
+
+    Raises
+    ------
+    BadInputError
+        None can.
+    """
+    if vcd is not None and (vcd == "-" or Path(vcd).is_char_device() or Path(vcd).is_fifo()):
+        raise BadInputError("--vcd needs a file: its .gtkw view goes beside it")
+    if vcd and engine == "compiled":
+        raise BadInputError("--vcd is written by pysim: leave out --engine compiled")
+    if trace == summary_file == "-":
+        raise BadInputError("--trace - and --json - would mix: send one of them to a file")
+    if engine == "compiled" and default_engine() != "compiled":
+        raise BadInputError("--engine compiled needs a C++ compiler: install one or use pysim")
+    return engine or ("pysim" if vcd else default_engine())
 
 
 def _timed(

@@ -1459,7 +1459,7 @@ USAGE = {
     "option": ([*LINE, "--witdh", "8"], "'--witdh'", "discreta simulate line --help"),
     "extra": ([*LINE, "5"], "(5)", "discreta simulate line --help"),
     "no start": (["simulate", "line"], "'--start'", "discreta simulate line --help"),
-    "no file": (PATH_OF, "'FILE.csv'", "discreta simulate path --help"),
+    "no file": (PATH_OF, "'FILE'", "discreta simulate path --help"),
     "no method": (["verilog"], "'METHOD'", "discreta verilog --help"),
     "no value": ([*LINE, "--json"], "'--json'", "requires an argument"),
     "preload": ([*LINE, "--preload", "full"], "'full'", "'zero', 'half'"),

@@ -46,7 +46,7 @@ def run(method, curve, drive, engine="pysim"):
     expected = curve.start + np.cumsum(moves, axis=0)
     trail = Trail(curve.start)
     trail.follow(expected)
-    machine = Machine(curve, core, drive, trail)
+    machine = Machine(curve, {curve.kind: core}, drive, trail)
     most = pace_limit(curve, drive, int(METHODS[method].clocks(golden, curve.blocks).sum()))
     seen = list(machine.run(limit=most, engine=engine))
     when, points = (np.concatenate(parts) for parts in zip(*seen, strict=True))
