@@ -58,14 +58,17 @@ struct Bench {
 	uint64_t clock = 0;
 	bool offering = false;
 
+	// A clock is evaluated once, at its rising edge: until the new values of the registers are
+	// committed all that can be seen is what it is before the edge.
 	void settle() {
 		clk.set(0);
-		cxxrtl_step(design);
+		cxxrtl_commit(design);
+		clk.set(1);
+		cxxrtl_eval(design);
 	}
 
 	void edge() {
-		clk.set(1);
-		cxxrtl_step(design);
+		cxxrtl_commit(design);
 	}
 
 	void reset() {
@@ -97,7 +100,10 @@ bool find(Bench *bench, const char *name, Port *port) {
 	cxxrtl_object *object = cxxrtl_get(bench->design, name);
 	if (object == nullptr || object->width > 64)
 		return false;
-	port->curr = object->curr;
+	// What is kept until a commit but is not a register would be a clock old.
+	const uint32_t kept = CXXRTL_DRIVEN_COMB | CXXRTL_DRIVEN_SYNC;
+	const bool fresh = object->next != nullptr && (object->flags & kept) == CXXRTL_DRIVEN_COMB;
+	port->curr = fresh ? object->next : object->curr;
 	port->next = object->next;
 	port->width = unsigned(object->width);
 	return true;
@@ -141,7 +147,8 @@ void *bench_create() {
 	bool steps = find(bench, "steps_valid", &bench->steps_valid) &&
 		find(bench, "steps_ready", &bench->steps_ready) && find(bench, "error", &bench->error);
 	bool device = find(bench, "busy", &bench->busy) && find(bench, "reason", &bench->reason);
-	if (!ok || steps == device) {
+	// Of a design with loops of wires one evaluation would not do.
+	if (!ok || steps == device || !cxxrtl_eval(bench->design)) {
 		cxxrtl_destroy(bench->design);
 		delete bench;
 		return nullptr;

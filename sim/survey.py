@@ -48,6 +48,10 @@ _ROUNDING = 1e-9
 _OVERHEAD = 2
 
 
+#: What judges the steps of blocks.
+_Judging = Contour | ArcJudge
+
+
 @dataclass
 class SurveyRow:
     """What a survey found for one variant of a method and one group of blocks.
@@ -140,7 +144,7 @@ class _Curve(Protocol):
     watch: tuple[str, ...]
     cost: int
 
-    def contour(self, blocks: np.ndarray) -> Contour:
+    def contour(self, blocks: np.ndarray) -> _Judging:
         """Give what compares the steps with the true curves."""
         ...
 
@@ -188,7 +192,7 @@ class _Arcs:
     watch: tuple[str, ...] = ("running", "turns", "backward", "p1", "p2", "p3", "p4")
     cost: int = 1
 
-    def contour(self, blocks: np.ndarray) -> ArcContour:
+    def contour(self, blocks: np.ndarray) -> _Judging:
         """Compare with the circles."""
         return ArcContour(blocks)
 
@@ -492,7 +496,8 @@ class _Judge:
         self._blocks, self._golden = blocks, golden
         self.names = tuple(golden.registers()) if golden else self._curve.watch
         self.contour = self._curve.contour(blocks)
-        self.contour.done_ends = method.timed and not method.per_period
+        if isinstance(self.contour, Contour):
+            self.contour.done_ends = method.timed and not method.per_period
         self.clocks = self.summations = 0
         self.findings: list[str] = []
         self.completed = np.zeros(len(blocks), dtype=bool)
