@@ -6,6 +6,7 @@ from math import hypot
 
 import numpy as np
 import pytest
+from amaranth.hdl import Fragment
 
 from discreta.hdl.constant_speed import ConstantSpeed, constant_arc, constant_line
 from discreta.hdl.exact_arc import ExactArc
@@ -190,4 +191,6 @@ def test_parameters_are_checked():
         ConstantSpeed(ExactLine(4), 3)
     with pytest.raises(ValueError, match="number of axes is 7: choose a whole number from 2 to 6"):
         constant_arc(4, 7)
-    assert constant_arc(6, 4).parameters["axes"] == 4
+    core = constant_arc(6, 4)
+    Fragment.get(core, None)  # it must be used
+    assert core.parameters["axes"] == 4
