@@ -289,14 +289,14 @@ def exact_device(
     unknown = [kind for kind in kinds if kind not in KINDS]
     if unknown or not kinds:
         raise ValueError(f"kinds are {tuple(kinds)!r}: choose one or more of {', '.join(KINDS)}")
+    if "conic" in kinds and axes != 2:
+        raise ValueError(f"number of axes is {axes!r}: conics lie in a plane, choose 2")
     parts: dict[str, Part] = {}
     if "line" in kinds:
         parts["line"] = constant_line(width, axes)
     if "arc" in kinds:
         parts["arc"] = constant_arc(width, axes)
     if "conic" in kinds:
-        if axes != 2:
-            raise ValueError(f"number of axes is {axes!r}: conics lie in a plane, choose 2")
         parts["conic"] = ExactConic(width)
     return Device(**parts, **choices)
 
