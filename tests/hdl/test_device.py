@@ -473,8 +473,7 @@ def expected_pulses(width: int, blocks: list[Block]) -> list[tuple[int, int]]:
 def pulses_of(seen: Seen, letters: str = "xy") -> tuple[np.ndarray, list[tuple[int, ...]]]:
     """Give the clocks of leading edges on the pins, and the step that each shows."""
     edges = {
-        a: np.flatnonzero(np.diff(seen[f"pins_{a}_step"], prepend=0) == 1).tolist()
-        for a in letters
+        a: np.flatnonzero(np.diff(seen[f"pins_{a}_step"], prepend=0) == 1).tolist() for a in letters
     }
     clocks = sorted(set().union(*edges.values()))
     ways = {a: dict.fromkeys(edges[a], 1) for a in letters}
@@ -556,7 +555,7 @@ def test_three_axes_on_the_pins(ticks):
         expected_steps(makes[kind], kind, start, values, letters)
         for start, (kind, values) in zip(starts, blocks, strict=False)
     ]
-    assert steps == sum(expected, [])
+    assert steps == [step for block in expected for step in block]
     # In the plane the helix is the arc; z goes up with each step, or not.
     plane = [step[:2] for step in expected[1] if any(step[:2])]
     on_arc = tuple((name, blocks[1][1][name]) for name in ("end_x", "end_y"))

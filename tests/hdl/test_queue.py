@@ -221,7 +221,7 @@ def test_even_while_a_kind_of_equal_ticks_runs():
         for clock in range(60):
             ctx.set(queue.blocks.valid, bool(left))
             if left:
-                ctx.set(queue.blocks.payload.kind, BlockKind[left[0]])
+                ctx.set(queue.blocks.payload.kind, KINDS[left[0].lower()])
             # Every block has four steps at least; then all that run are at their last one.
             for kind in ("line", "arc"):
                 ctx.set(getattr(queue, f"{kind}_steps").payload.last, clock % 4 == 3)

@@ -180,7 +180,7 @@ def test_limits():
     assert (linear.method, line.method, arc.method) == ("linear", DEVICE, DEVICE)
     assert (linear.curve, line.curve, arc.curve) == ("line", "line", "arc")
     assert (linear.least, linear.most) == (1, 2)
-    # The exact line makes a diagonal step where the lecture's makes two: as many as its longest way.
+    # Where the lecture's makes two steps the exact line makes a diagonal one: its longest way.
     ways = speed._sample("line", 4)[:, 2:]
     longest = np.abs(ways).max(axis=1)
     assert line.steps == (longest - 1).sum()

@@ -64,7 +64,10 @@ def test_it_is_the_golden_model_with_the_lectures_interpolators(width, kinds):
 
 def test_it_is_the_golden_model_of_three_axes():
     """Lines in space, arcs with an axis along them."""
-    models = (("line", golden_models.constant_line(6, 3)), ("arc", golden_models.constant_arc(6, 3)))
+    models = (
+        ("line", golden_models.constant_line(6, 3)),
+        ("arc", golden_models.constant_arc(6, 3)),
+    )
     golden = GoldenDevice(models, FeedUnit(3, PAUSES[:3]), PulseUnit(6, 3))
     claims = equivalence(exact_device(6, 3, ("line", "arc"), depth=1), golden)
     assert [verdict for verdict in map(check, claims) if not verdict.holds] == []
