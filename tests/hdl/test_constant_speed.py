@@ -3,6 +3,7 @@
 """Constant speed: the exact cores' steps, spread over ticks; further axes along an arc."""
 
 from math import hypot
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from tests.hdl.traces import golden_trace
 
 STALLS = [NO_STALLS, Stalls(1, stall=0.5, gap=0.3), Stalls(2, stall=0.9)]
 COLUMN = {name: index for index, name in enumerate(EVENT_COLUMNS)}
-MAKE = {
+MAKE: dict[str, tuple[Any, Any]] = {
     "line": (constant_line, golden_models.constant_line),
     "arc": (constant_arc, golden_models.constant_arc),
 }

@@ -909,6 +909,30 @@ def placed_under_a_pulse(queue, m):
 
 
 @broken
+def pace_lost(queue, m):
+    """Lines run at full speed."""
+    m.d.comb += queue.line_blocks.payload.pace.eq(0)
+
+
+@broken
+def pace_halved(queue, m):
+    """Arcs are told half of their pace."""
+    m.d.comb += queue.arc_blocks.payload.pace.eq(Value.cast(queue.head[("pace",)]) >> 1)
+
+
+@broken
+def ticks_paid_as_steps(device, m):
+    """A tick that moves both axes is as long as a diagonal, one that moves none takes no time."""
+    m.d.comb += device.feed.even.eq(0)
+
+
+@broken
+def interpolator_kept(device, m):
+    """What an arc resets by hand is not reset while the device stands."""
+    m.d.comb += device.interpolators["arc"].restart.eq(0)
+
+
+@broken
 def hold_ignored(device, m):
     """`hold` does not come to the feed unit."""
     m.d.comb += device.feed.hold.eq(device.stop_asked)
