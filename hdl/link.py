@@ -12,7 +12,7 @@ from amaranth.lib import data, enum, stream
 from amaranth.lib.wiring import In, Out
 
 from discreta.hdl.contract import Part, check_axes, check_width, per_axis, point_layout
-from discreta.hdl.feed import ACCELERATION_BITS, FULL_OVERRIDE, OVERRIDE_BITS
+from discreta.hdl.feed import ACCELERATION_BITS, OVERRIDE_BITS
 from discreta.hdl.plain import leaves
 from discreta.hdl.pulse import TIMING_BITS
 from discreta.hdl.queue import StopReason, check_depth
@@ -28,10 +28,10 @@ __all__ = [
     "NUMBERED",
     "FrameType",
     "Link",
+    "fingerprint",
     "layout_fields",
     "payload_bytes",
     "settings_layout",
-    "fingerprint",
     "status_layout",
 ]
 
@@ -148,9 +148,9 @@ class Link(Part):
     number.
 
     Every frame is answered, a damaged one too. An answer is made when it is sent, so that one may
-    answer several frames. ``dropped`` counts, modulo 256,
-    the frames that were not acted on, repeated ones too. ``room`` is the number of blocks that the
-    queue takes for sure: its depth less the blocks it was given and has not answered.
+    answer several frames. ``dropped`` counts, modulo 256, the frames that were not acted on, but
+    no repeated ones: those have one of the last 128 numbers. ``room`` is the number of blocks that
+    the queue takes for sure: its depth less the blocks it was given and has not answered.
 
     Latency: a frame is acted on two clocks after its closing flag was given. Throughput: a byte a
     clock in, a byte a clock out.
@@ -355,15 +355,18 @@ class Link(Part):
         opened, acts = Signal(), Signal()
         taken = Signal()
         hello, block, numbered = Signal(), Signal(), Signal()
+        ahead, command_ahead = Signal(8), Signal(8)
         m.d.comb += [
             hello.eq(self.arrived & self._is("HELLO")),
             block.eq(self.arrived & self._is("BLOCK")),
             numbered.eq(self.arrived & self._is(*NUMBERED)),
             opened.eq(self.session != 0),
-            acts.eq(numbered & opened & (self.number == self.next_command)),
+            ahead.eq(self.number - self.next_block),
+            command_ahead.eq(self.number - self.next_command),
+            acts.eq(numbered & opened & (command_ahead == 0)),
             self.heard.eq(self.arrived),
             self.blocks.payload.eq(self._top(self.sizes["BLOCK"])[: self.layout.size]),
-            self.blocks.valid.eq(block & opened & (self.number == self.next_block)),
+            self.blocks.valid.eq(block & opened & (ahead == 0)),
             taken.eq(self.blocks.valid & self.blocks.ready),
             self.single.eq(acts & self._is("SINGLE")),
             self.stop.eq(acts & self._is("STOP")),
@@ -388,7 +391,9 @@ class Link(Part):
                     self._settings, self._top(self.sizes["SET"])[: self._settings.size]
                 )
                 m.d.sync += [register.eq(given[name]) for name, register in self.settings.items()]
-        with m.If(self.damaged | (block & ~taken) | (numbered & ~acts)):
+        # A repeated frame is no news: its number is behind.
+        missed = (block & ~taken & ~ahead[7]) | (numbered & ~acts & ~command_ahead[7])
+        with m.If(self.damaged | missed):
             m.d.sync += self.dropped.eq(self.dropped + 1)
         with m.If(self.done):
             m.d.sync += self.done_count.eq(self.done_count + 1)
@@ -456,23 +461,21 @@ class Link(Part):
             with m.Switch(self.stage):
                 with m.Case(opening):
                     m.d.sync += self.stage.eq(body)
-                with m.Case(body):
-                    with m.If(~escapes):
-                        m.d.sync += [
-                            self.proof.eq(_checksum(self.proof, plain)),
-                            self.left.eq(self.left - 1),
-                            *(a.eq(b) for a, b in zip(self.answer, self.answer[1:], strict=False)),
-                        ]
-                        with m.If(self.left == 0):
-                            m.d.sync += [self.stage.eq(check), self.left.eq(CHECKSUM_BYTES - 1)]
-                with m.Case(check):
-                    with m.If(~escapes):
-                        m.d.sync += [
-                            self.proof.eq(self.proof >> 8),
-                            self.left.eq(self.left - 1),
-                        ]
-                        with m.If(self.left == 0):
-                            m.d.sync += self.stage.eq(closing)
+                with m.Case(body), m.If(~escapes):
+                    m.d.sync += [
+                        self.proof.eq(_checksum(self.proof, plain)),
+                        self.left.eq(self.left - 1),
+                        *(a.eq(b) for a, b in zip(self.answer, self.answer[1:], strict=False)),
+                    ]
+                    with m.If(self.left == 0):
+                        m.d.sync += [self.stage.eq(check), self.left.eq(CHECKSUM_BYTES - 1)]
+                with m.Case(check), m.If(~escapes):
+                    m.d.sync += [
+                        self.proof.eq(self.proof >> 8),
+                        self.left.eq(self.left - 1),
+                    ]
+                    with m.If(self.left == 0):
+                        m.d.sync += self.stage.eq(closing)
                 with m.Default():
                     m.d.sync += self.stage.eq(idle)
 

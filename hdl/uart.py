@@ -110,16 +110,14 @@ class UartReceiver(Part):
             m.d.sync += self.timer.eq(self.clocks_per_bit // 2 - 1)
             with m.If(~self.rx):
                 m.d.sync += self.slot.eq(_START)
-        with m.Elif(self.slot == _BROKEN):
-            with m.If(self.rx):
-                m.d.sync += self.slot.eq(0)
+        with m.Elif(self.slot == _BROKEN), m.If(self.rx):
+            m.d.sync += self.slot.eq(0)
         with m.Elif(self.timer != 0):
             m.d.sync += self.timer.eq(self.timer - 1)
         with m.Else():
             m.d.sync += [self.timer.eq(self.clocks_per_bit - 1), self.slot.eq(self.slot + 1)]
-            with m.If(self.slot == _START):
-                with m.If(self.rx):
-                    m.d.sync += self.slot.eq(0)
+            with m.If(self.slot == _START), m.If(self.rx):
+                m.d.sync += self.slot.eq(0)
             with m.Elif(self.slot == _STOP_BIT):
                 m.d.sync += [self.received.eq(1), self.broken.eq(~self.rx)]
                 with m.If(self.rx):
