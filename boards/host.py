@@ -45,6 +45,8 @@ _POLL = 0.005
 #: Numbers are counted modulo this; frames on their way are fewer than half of it.
 _NUMBERS = 256
 _MAX_WINDOW = 127
+#: Frames that are on their way at least, so that the line does not wait for the answer.
+_LEAST_AHEAD = 3.0
 
 _Fields = list[tuple[str, int, bool]]
 
@@ -267,6 +269,8 @@ class Host:
         self._first = self._sent = self._ever_sent = 0
         #: Frames before that time which the board will drop, as they are not the next.
         self._stale = 0
+        #: Frames that may be on their way: fewer where many are dropped, as all behind are, too.
+        self._ahead: float = window
         self._command = 0
         self._heard = self._clock()
         self.accepted = 0
@@ -339,7 +343,8 @@ class Host:
             The board answers no more, or was reset.
         """
         rows = iter(blocks)
-        self._heard = asked = deadline = self._clock()
+        self._heard = asked = self._clock()
+        deadline = asked + self._timeout
         while self._fill(rows):
             if self._sent == 0 and self._clock() - asked >= _POLL:
                 asked = self._clock()
@@ -354,13 +359,13 @@ class Host:
                 deadline = self._clock() + self._timeout
             elif self._clock() >= deadline:
                 self.statistics.timeouts += 1
-                self._sent = self._stale = 0
+                self._go_back(0)
                 deadline = self._clock() + self._timeout
 
     def _fill(self, rows: Iterator[Sequence[int]]) -> bool:
         """Send what the board has room for; tell whether there is anything left to do."""
         assert self.status is not None, "no session is open"
-        allowed = min(self._window, self.status.room)
+        allowed = min(int(self._ahead), self.status.room)
         while self._sent < max(allowed, 1):
             if self._sent == len(self._frames):
                 row = next(rows, None)
@@ -507,14 +512,19 @@ class Host:
         self.statistics.dropped += dropped
         if dropped > self._stale and self._sent:
             # All that is on its way behind the one that was dropped is dropped too.
-            self._stale = max(0, self._sent - dropped)
-            self._sent = 0
+            self._go_back(max(0, self._sent - dropped))
         else:
             self._stale = 0 if more else max(0, self._stale - dropped)
+        self._ahead = min(self._window, self._ahead + more / self._ahead)
         done = before.done + (status.done - self._done_before) % (1 << 16)
         self._done_before = status.done
         self.status = replace(status, done=done)
         return True
+
+    def _go_back(self, stale: int) -> None:
+        """Send all again that is not acknowledged; so many frames on their way are in vain."""
+        self._sent, self._stale = 0, stale
+        self._ahead = max(_LEAST_AHEAD, self._ahead / 2)
 
     def _read(self) -> list[Status]:
         """Give the answers that have come, of whatever session."""
