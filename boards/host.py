@@ -13,7 +13,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from discreta.hdl.device import Device
+from amaranth.lib import data
+
+from discreta.hdl.contract import AXIS_LETTERS
 from discreta.hdl.link import (
     CHECKSUM_BYTES,
     ESCAPE,
@@ -217,8 +219,10 @@ class Host:
     Parameters
     ----------
     port : Port
-    device : Device
-        One like the board's: it says what blocks are like.
+    layout : StructLayout
+        Of the blocks that the board takes: :func:`~discreta.hdl.device.exact_layout`.
+    width, axes : int
+        Of the board's device.
     timeout : float
         Seconds.
     window : int
@@ -243,7 +247,9 @@ class Host:
     def __init__(
         self,
         port: Port,
-        device: Device,
+        layout: data.StructLayout,
+        width: int,
+        axes: int,
         *,
         timeout: float = 0.1,
         window: int = 64,
@@ -253,11 +259,10 @@ class Host:
             raise ValueError(f"window is {window}: choose a whole number from 1 to {_MAX_WINDOW}")
         if not timeout > 0:
             raise ValueError(f"time-out is {timeout}: choose more than 0 seconds")
-        layout = device.queue.layout
         self._block_fields = layout_fields(layout)
         self._setting_fields = layout_fields(settings_layout())
-        self._status_fields = layout_fields(status_layout(device.width, device.axes))
-        self._letters = device.queue.letters
+        self._status_fields = layout_fields(status_layout(width, axes))
+        self._letters = AXIS_LETTERS[:axes]
         self._fingerprint = fingerprint(layout).to_bytes(4, "little")
         self._port, self._clock = port, clock
         self._timeout, self._window = timeout, window

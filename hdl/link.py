@@ -152,7 +152,7 @@ class Link(Part):
     no repeated ones: those have one of the last 128 numbers. ``room`` is the number of blocks that
     the queue takes for sure: its depth less the blocks it was given and has not answered.
 
-    Latency: a frame is acted on two clocks after its closing flag was given. Throughput: a byte a
+    Latency: a frame is acted on in the clock after its closing flag. Throughput: a byte a
     clock in, a byte a clock out.
 
     Reset: no session, no block, override 0, so that nothing moves before a SET; numbers begin at 0.

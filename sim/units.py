@@ -4,7 +4,7 @@ from typing import Any
 
 from discreta.hdl.conic import MAX_WIDTH as CONIC_MAX_WIDTH
 from discreta.hdl.constant_speed import constant_arc, constant_line
-from discreta.hdl.device import exact_device
+from discreta.hdl.device import exact_device, exact_layout
 from discreta.hdl.feed import PAUSES, FeedUnit
 from discreta.hdl.link import Link, fingerprint, layout_fields
 from discreta.hdl.pulse import KINDS as PIN_KINDS
@@ -34,13 +34,12 @@ def _golden_device(width: int, *, kinds: tuple[str, ...], depth: int) -> Any:
 
 def _link(width: int, axes: int = 2, *, kinds: tuple[str, ...], depth: int) -> Link:
     """Make the link of a device that has these kinds of curves."""
-    device = exact_device(width, axes, kinds, depth=depth)
-    return Link(device.queue.layout, width, axes, depth)
+    return Link(exact_layout(width, axes, kinds), width, axes, depth)
 
 
 def _golden_link(width: int, axes: int = 2, *, kinds: tuple[str, ...], depth: int) -> GoldenLink:
     """Make its golden model."""
-    layout = exact_device(width, axes, kinds, depth=depth).queue.layout
+    layout = exact_layout(width, axes, kinds)
     return GoldenLink(tuple(layout_fields(layout)), fingerprint(layout), width, axes, depth)
 
 

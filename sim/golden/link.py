@@ -14,6 +14,7 @@ answer (``due``, its ``stage``, bytes ``left``, ``flipped`` behind an escape, it
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from discreta.sim.golden.logic import Value, equal, less, negate, where
 
@@ -90,7 +91,7 @@ class Link:
         """The axis letters."""
         return "xyzabc"[: self.axes]
 
-    @property
+    @cached_property
     def status(self) -> tuple[Field, ...]:
         """The fields of a status, in order."""
         counts = ("session", "next_block", "next_command", "room", "dropped")
@@ -103,18 +104,18 @@ class Link:
         fields += [(f"position_{a}", self.width + 1, True) for a in self.letters]
         return tuple(fields)
 
-    @property
+    @cached_property
     def sizes(self) -> dict[str, int]:
         """Bytes of payload, by type."""
         own = {"HELLO": 4, "BLOCK": _bytes(self.blocks), "SET": _bytes(SETTINGS)}
         return dict.fromkeys(TYPES, 0) | own
 
-    @property
+    @cached_property
     def room_for(self) -> int:
         """Bytes of the longest payload."""
         return max(self.sizes.values())
 
-    @property
+    @cached_property
     def answer_size(self) -> int:
         """Bytes of an answer before its CRC."""
         return 1 + _bytes(self.status)
