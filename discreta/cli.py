@@ -41,6 +41,7 @@ from discreta.hdl.contract import (
 from discreta.hdl.harness import LoneAccumulator
 from discreta.hdl.parts import PRELOADS
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
+from discreta.hdl.queue import KINDS as CURVE_KINDS
 from discreta.hdl.verilog import verilog as emit_verilog
 from discreta.sim.carrier import DEFAULT_PERIOD, DEFAULT_SPEED, MAX_PERIOD
 from discreta.sim.compiled import compiler
@@ -50,6 +51,7 @@ from discreta.sim.gcode import IGNORABLE, SUFFIXES, is_gcode, read_moves
 from discreta.sim.machine import Drive
 from discreta.sim.methods import DEFAULTS, METHODS, Design, Method
 from discreta.sim.outputs import Outputs
+from discreta.sim.plot import picture_format
 from discreta.sim.plotter import PulseTiming
 from discreta.sim.points import (
     MAX_TURNS,
@@ -154,6 +156,32 @@ class _Speed(click.ParamType):
 
 #: The name of the family of the exact methods.
 _EXACT = "exact"
+class _Part(click.ParamType):
+    """A part of a whole: a number from 0 to less than 1."""
+
+    name = "PART"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+        if not _NUMBER.fullmatch(value) or not 0 <= Fraction(value) < 1:
+            self.fail(f"{value} is no part: choose a number from 0 to less than 1", param, ctx)
+        return float(Fraction(value))
+
+
+class _Kinds(click.ParamType):
+    """Kinds of curves that a device draws."""
+
+    name = "KINDS"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str, ...]:
+        kinds = tuple(dict.fromkeys(value.split(",")))
+        if not set(kinds) <= set(CURVE_KINDS):
+            self.fail(
+                f"{value!r} are no kinds: give one or more of {', '.join(CURVE_KINDS)} with commas "
+                "between",
+                param,
+                ctx,
+            )
+        return kinds
 
 
 class _MethodName(click.ParamType):
@@ -367,13 +395,7 @@ _timing_options = _options(
 
 #: What a run on the whole device is given; any of them asks for one.
 _DRIVE = ("feed", "accel", "pulse")
-_drive_options = _options(
-    click.option(
-        "--feed",
-        type=_Speed(),
-        help="Run on the whole device, at this speed along the path: steps per clock, up to 1, a "
-        "decimal or a fraction. [default: 1 with any of the four below]",
-    ),
+_DRIVE_CHOICES = (
     click.option(
         "--accel",
         type=_Numbers("an acceleration", "1e-6"),
@@ -388,6 +410,15 @@ _drive_options = _options(
         help="Clocks of the pulses: length, space behind, set-up and hold of the direction. "
         "[default: 1,1,1,1]",
     ),
+)
+_drive_options = _options(
+    click.option(
+        "--feed",
+        type=_Speed(),
+        help="Run on the whole device, at this speed along the path: steps per clock, up to 1, a "
+        "decimal or a fraction. [default: 1 with any of the four below]",
+    ),
+    *_DRIVE_CHOICES,
     click.option(
         "--plotter",
         metavar="FILE.svg|.png",
@@ -1406,6 +1437,144 @@ def stress_command(blocks: int, seed: int) -> None:
         table.add_row(name, value)
     _out().print(table)
     if not report.good:
+        raise click.exceptions.Exit(1)
+
+
+def _check_seed(seed: int) -> None:
+    if not 0 <= seed < 1 << 32:
+        raise ValueError(f"seed is {seed}: choose a whole number from 0 to {(1 << 32) - 1}")
+
+
+def _check_bits(clocks: int) -> None:
+    # Not needed by any other command.
+    from discreta.hdl.uart import check_clocks_per_bit
+
+    check_clocks_per_bit(clocks)
+
+
+@cli.command("send", short_help="Send a path to a board, or to the simulated one.")
+@click.argument("port", metavar="PORT")
+@click.argument("file", metavar="FILE.csv")
+@click.option(
+    "--feed",
+    type=_Speed(),
+    required=True,
+    help="Speed along the path: steps per clock of the board, up to 1, a decimal or a fraction.",
+)
+@_options(*_DRIVE_CHOICES)
+@_width
+@click.option(
+    "--kinds",
+    type=_Kinds(),
+    default="line,arc",
+    show_default=True,
+    help="What the board draws, as it was built: of line, arc and conic.",
+)
+@click.option("--baud", type=click.IntRange(300), help="Of the port. [default: 115200]")
+@click.option(
+    "--clear",
+    is_flag=True,
+    help="Go on where the machine stands still for an emergency, a limit switch or a refused "
+    "block.",
+)
+@click.option(
+    "--clocks-per-bit",
+    type=_Number("clocks per bit", 4, 65536, _check_bits),
+    help="Of the simulated board. [default: 8]",
+)
+@click.option(
+    "--damage",
+    type=_Part(),
+    help="Of the line to the simulated board: the part of all bytes that arrive as others. "
+    "[default: 0]",
+)
+@click.option(
+    "--lose", type=_Part(), help="The part of all frames that do not arrive. [default: 0]"
+)
+@click.option(
+    "--seed", type=_Number("seed", 0, 2**32 - 1, _check_seed), help="Which ones. [default: 0]"
+)
+@click.option(
+    "--plotter",
+    metavar="FILE.svg|.png",
+    help="Picture of what a machine draws that sees only the simulated board's pins.",
+)
+@click.option("--json", "summary_file", metavar="FILE|-", help="The summary, as JSON.")
+def send_command(
+    port: str,
+    file: str,
+    width: int,
+    kinds: tuple[str, ...],
+    baud: int | None,
+    clear: bool,
+    plotter: str | None,
+    summary_file: str | None,
+    **given: Any,
+) -> None:
+    """Send a path to a board at a serial port, and wait until it is drawn.
+
+    PORT is a serial port like /dev/ttyUSB0, or sim: for the simulated board: the RTL of the whole
+    controller, compiled, behind a pseudo-terminal, with a machine at its pins that sees nothing
+    else. Ctrl-C stops the machine down its ramp and tells where it stands. Exits 1 when the machine
+    has stopped before the end, the board does not answer, or the simulated machine was not just
+    where the golden models are.
+
+    \b
+    Example: discreta send sim: examples/bulgaria.csv --feed 1/4 \\
+                 --damage 0.01 --lose 0.01 --plotter sent.png
+    """
+    from discreta.boards.host import LinkError
+    from discreta.hdl.device import exact_device
+    from discreta.send import SIMULATED, Job, Simulation, send
+    from discreta.sim.machine import device_blocks
+
+    simulated = {name: given.pop(name) for name in ("clocks_per_bit", "damage", "lose", "seed")}
+    simulated = {name: value for name, value in simulated.items() if value is not None}
+    for name in (*simulated, *(["plotter"] if plotter else [])):
+        if port != SIMULATED:
+            raise BadInputError(
+                f"--{name.replace('_', '-')} is for the simulated board: give {SIMULATED} for the "
+                "port, or leave it out"
+            )
+    if baud is not None and port == SIMULATED:
+        raise BadInputError(f"--baud is for a port, and {SIMULATED} is none: leave it out")
+    drive = _drive({**given}, {"plotter": None, "screen": None})
+    assert drive is not None
+    curve = Polyline(read_points(file, width))
+    curve.check(width)
+    kind = picture_format("--plotter", plotter)
+    device = exact_device(width, curve.axes, kinds)
+    job = Job(device, device_blocks(device, curve, drive), drive)
+    if port == SIMULATED:
+        _needs_compiler()
+    try:
+        with Outputs((file,)) as outputs:
+            json_file = outputs.open(summary_file) if summary_file is not None else None
+            picture = outputs.place(plotter) if plotter is not None else None
+            with _progress("blocks", quiet=False) as show:
+                began = time.perf_counter()
+                good = True
+                if port == SIMULATED:
+                    board = Simulation(job, **simulated)
+                    try:
+                        summary = send(job, board.name, clear=clear, progress=show)
+                    finally:
+                        board.close()
+                    summary |= board.facts(summary)
+                    good = board.good
+                    if picture is not None:
+                        board.pen.draw(picture, kind, f"sent, {width} bits")
+                else:
+                    speed = {} if baud is None else {"baud": baud}
+                    summary = send(job, port, clear=clear, progress=show, **speed)
+            if json_file:
+                json.dump(summary, json_file, indent=2)
+                json_file.write("\n")
+    except LinkError as error:
+        _complain(str(error))
+        raise click.exceptions.Exit(1) from None
+    _print_summary(summary, time.perf_counter() - began, err=summary_file == "-")
+    if not good or "stopped" in summary:
         raise click.exceptions.Exit(1)
 
 
