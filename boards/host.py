@@ -442,7 +442,7 @@ class Host:
         return self._repeat("QUERY", 0, b"", lambda _: True)
 
     def wait(self, progress: Callable[[Status], object] | None = None) -> Status:
-        """Wait until all is done that the board was given, or the machine has stopped.
+        """Wait until all is done that the board has taken, or the machine has stopped.
 
         Raises
         ------
@@ -453,8 +453,7 @@ class Host:
             status = self.query()
             if progress:
                 progress(status)
-            stands = status.reason is not StopReason.NONE
-            if not status.busy and (stands or status.done >= self.accepted):
+            if not status.busy:
                 return status
 
     def _repeat(

@@ -420,7 +420,8 @@ class Link(Part):
             status.dropped.eq(self.dropped),
             status.done.eq(self.done_count),
             status.reason.eq(self.reason.as_value()),
-            status.busy.eq(self.busy),
+            # Who sees it end sees the last block counted.
+            status.busy.eq(self.busy | self.done),
             status.held.eq(self.held),
             status.emergency.eq(self.button),
             status.low_limit.eq(self.low_limit),

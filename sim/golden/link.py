@@ -300,6 +300,8 @@ class Link:
         told = {name: state[name] for name in ("session", "next_block", "next_command", "dropped")}
         told |= {"room": where(less(255, free), 255, free), "done": state["done_count"]}
         told |= {"held": state["held"], "emergency": inputs["button"]}
+        # A block that ends just now is not counted yet.
+        told["busy"] = inputs["busy"] | inputs["done"]
         told |= {name: inputs[name] for name, _, _ in self.status if name not in told}
         answer: list[Value] = [0] * (self.answer_size - 1)
         first = 0

@@ -136,7 +136,8 @@ def test_the_queue_never_runs_empty_at_a_usual_speed():
     way.host.send(rows.tolist())
     way.host.wait()
     way.check(rows)
-    assert set(np.diff(way.plotter.moves[0])) <= {31, 32, 33}
+    # Where it turns round, the direction's set-up is waited for.
+    assert np.diff(way.plotter.moves[0]).max() <= 32 + 4
 
 
 def test_hold_single_steps_and_resume():
