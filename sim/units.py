@@ -43,8 +43,8 @@ def _golden_link(width: int, axes: int = 2, *, kinds: tuple[str, ...], depth: in
     return GoldenLink(tuple(layout_fields(layout)), fingerprint(layout), width, axes, depth)
 
 
-#: Clocks of a bit: the fewest, an odd number, and those of 115,200 baud at 12 MHz.
-_BITS = (4, 5, 104)
+#: Clocks of a bit: the fewest, an odd number, a common one; and those of 115,200 baud at 12 MHz.
+_BITS, _USUAL_BIT = (4, 5, 16), 104
 
 UNITS = {
     unit.name: unit
@@ -113,7 +113,8 @@ UNITS = {
             device=lambda _width, **choices: UartReceiver(**choices),
             golden=lambda _width, **choices: GoldenUartReceiver(**choices),
             choices={"clocks_per_bit": _BITS},
-            settings={"default": {"clocks_per_bit": _BITS[-1]}},
+            settings={"default": {"clocks_per_bit": _USUAL_BIT}},
+            proofs="uart",
         ),
         Design(
             name="uart_transmitter",
@@ -121,7 +122,8 @@ UNITS = {
             device=lambda _width, **choices: UartTransmitter(**choices),
             golden=lambda _width, **choices: GoldenUartTransmitter(**choices),
             choices={"clocks_per_bit": _BITS},
-            settings={"default": {"clocks_per_bit": _BITS[-1]}},
+            settings={"default": {"clocks_per_bit": _USUAL_BIT}},
+            proofs="uart",
         ),
     )
 }
