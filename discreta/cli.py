@@ -38,6 +38,7 @@ from discreta.hdl.contract import (
     check_guard,
     check_width,
 )
+from discreta.hdl.device import Device, exact_device
 from discreta.hdl.harness import LoneAccumulator
 from discreta.hdl.parts import PRELOADS
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
@@ -47,8 +48,8 @@ from discreta.sim.carrier import DEFAULT_PERIOD, DEFAULT_SPEED, MAX_PERIOD
 from discreta.sim.compiled import compiler
 from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
 from discreta.sim.curves import Arc, Conic, Curve, Polyline
-from discreta.sim.gcode import IGNORABLE, SUFFIXES, is_gcode, read_moves
-from discreta.sim.machine import Drive
+from discreta.sim.gcode import IGNORABLE, SUFFIXES, Move, is_gcode, read_moves
+from discreta.sim.machine import Drive, device_blocks
 from discreta.sim.methods import DEFAULTS, METHODS, Design, Method
 from discreta.sim.outputs import Outputs
 from discreta.sim.plot import picture_format
@@ -62,7 +63,7 @@ from discreta.sim.points import (
     read_points,
     say_point,
 )
-from discreta.sim.program import CORES, Program, run_program, speeds
+from discreta.sim.program import CORES, Program, program_blocks, run_program, speeds
 from discreta.sim.run import run, say_choices
 from discreta.sim.simulate import ENGINES, DeadCoreError, default_engine
 from discreta.sim.synth import (
@@ -156,6 +157,8 @@ class _Speed(click.ParamType):
 
 #: The name of the family of the exact methods.
 _EXACT = "exact"
+
+
 class _Part(click.ParamType):
     """A part of a whole: a number from 0 to less than 1."""
 
@@ -677,13 +680,35 @@ def simulate_path(file: str, width: int, **options: Any) -> None:
     if is_gcode(file):
         _simulate_program(file, width, program, options)
         return
+    _check_no_gcode(file, program)
+    _simulate(Polyline(read_points(file, width)), width=width, reads=(file,), **options)
+
+
+def _check_no_gcode(file: str, program: dict[str, Any]) -> None:
+    """Refuse options of G-code for a file that has none."""
     for name, value in program.items():
         if value:
             raise BadInputError(
                 f"--{name.replace('_', '-')} goes with G-code, and {file} is read as CSV: leave it "
                 f"out, or name a file that ends in {', '.join(SUFFIXES)}"
             )
-    _simulate(Polyline(read_points(file, width)), width=width, reads=(file,), **options)
+
+
+def _read_program(file: str, width: int, program: dict[str, Any]) -> list[Move]:
+    """Read a program in G-code."""
+    if program["steps_per_mm"] is None:
+        raise BadInputError(
+            f"{file} is in mm or inches: give --steps-per-mm, like --steps-per-mm 80"
+        )
+    return read_moves(file, program["steps_per_mm"], width, program["ignore"] or ())
+
+
+def _feeds(file: str, moves: list[Move], program: dict[str, Any]) -> list[Fraction]:
+    """Give the speed of every move of a program, in steps per clock."""
+    try:
+        return speeds(moves, program["clock"] * 10**6, program["rapid"])
+    except BadInputError as error:
+        raise BadInputError(f"{file}, {error}") from None
 
 
 def _simulate_program(
@@ -699,29 +724,21 @@ def _simulate_program(
             f"G-code runs on {' and '.join(core.name for core in CORES.values())}: leave out "
             "--method and --setting"
         )
-    steps_per_mm, clock, rapid = (program[name] for name in ("steps_per_mm", "clock", "rapid"))
-    if steps_per_mm is None:
-        raise BadInputError(
-            f"{file} is in mm or inches: give --steps-per-mm, like --steps-per-mm 80"
-        )
-    moves = read_moves(file, steps_per_mm, width, program["ignore"] or ())
+    moves = _read_program(file, width, program)
     device = {name: options.pop(name) for name in ("accel", "pulse")} | {"feed": None}
     asked = [
         f"--{name}"
         for name in ("rapid", "accel", "pulse", "plotter", "screen")
         if (program | device | options)[name] is not None
     ]
-    if clock is None and asked:
+    if program["clock"] is None and asked:
         raise BadInputError(
             f"{asked[0]} goes with the whole device, which turns mm a minute into clocks: give "
             "--clock, too"
         )
     drive, feeds = None, []
-    if clock is not None:
-        try:
-            feeds = speeds(moves, clock * 10**6, rapid)
-        except BadInputError as error:
-            raise BadInputError(f"{file}, {error}") from None
+    if program["clock"] is not None:
+        feeds = _feeds(file, moves, program)
         drive = _drive(device | {"feed": max(feeds)}, options)
     _run_shown(
         partial(run_program, Program(moves), width=width, drive=drive, feeds=feeds, reads=(file,)),
@@ -1452,15 +1469,60 @@ def _check_bits(clocks: int) -> None:
     check_clocks_per_bit(clocks)
 
 
+def _job(file: str, width: int, kinds: tuple[str, ...], given: dict[str, Any]) -> Any:
+    """Give what a file has to be sent, with its speeds."""
+    from discreta.send import Job
+
+    program = {name: given.pop(name) for name in _GCODE}
+    pictures = {"plotter": None, "screen": None}
+    if not is_gcode(file):
+        _check_no_gcode(file, program)
+        if given["feed"] is None:
+            raise BadInputError("a path of support points has no speed: give --feed, like 1/100")
+        points = read_points(file, width)
+        curve = Polyline(points)
+        curve.check(width)
+        drive = cast(Drive, _drive(given, pictures))
+        device = _exact_device(width, curve.axes, kinds, ["line"])
+        return Job(device, device_blocks(device, curve, drive), drive)
+    if given["feed"] is not None:
+        raise BadInputError("--feed does not go with G-code, the speed is that of F: leave it out")
+    moves = _read_program(file, width, program)
+    if program["clock"] is None:
+        raise BadInputError("G-code has mm a minute: give --clock, that of the board, in MHz")
+    feeds = _feeds(file, moves, program)
+    drive = cast(Drive, _drive(given | {"feed": max(feeds)}, pictures))
+    whole = Program(moves)
+    used = sorted({move.kind for move in moves})
+    if "arc" in used and whole.axes > 2:
+        raise BadInputError(f"{file} has arcs and moves Z: leave Z out, or make the arcs of lines")
+    device = _exact_device(width, whole.axes, kinds, used)
+    return Job(device, program_blocks(device, whole, drive, feeds), drive)
+
+
+def _exact_device(width: int, axes: int, kinds: tuple[str, ...], used: list[str]) -> Device:
+    """Make a device like the board's, if it can draw what is used."""
+    for kind in used:
+        if kind not in kinds:
+            raise BadInputError(
+                f"--kinds {','.join(kinds)}: the path has {kind}s: build the board with them"
+            )
+    try:
+        return exact_device(width, axes, kinds)
+    except ValueError as error:
+        raise BadInputError(str(error)) from None
+
+
 @cli.command("send", short_help="Send a path to a board, or to the simulated one.")
 @click.argument("port", metavar="PORT")
-@click.argument("file", metavar="FILE.csv")
+@click.argument("file", metavar="FILE")
 @click.option(
     "--feed",
     type=_Speed(),
-    required=True,
-    help="Speed along the path: steps per clock of the board, up to 1, a decimal or a fraction.",
+    help="CSV: speed along the path: steps per clock of the board, up to 1, a decimal or a "
+    "fraction.",
 )
+@_gcode_options
 @_options(*_DRIVE_CHOICES)
 @_width
 @click.option(
@@ -1513,6 +1575,9 @@ def send_command(
 ) -> None:
     """Send a path to a board at a serial port, and wait until it is drawn.
 
+    FILE is G-code, which needs --steps-per-mm and --clock, or a CSV file of support points, which
+    needs --feed: as for `discreta simulate path`. The machine is said to stand at its start.
+
     PORT is a serial port like /dev/ttyUSB0, or sim: for the simulated board: the RTL of the whole
     controller, compiled, behind a pseudo-terminal, with a machine at its pins that sees nothing
     else. Ctrl-C stops the machine down its ramp and tells where it stands. Exits 1 when the machine
@@ -1524,9 +1589,7 @@ def send_command(
                  --damage 0.01 --lose 0.01 --plotter sent.png
     """
     from discreta.boards.host import LinkError
-    from discreta.hdl.device import exact_device
-    from discreta.send import SIMULATED, Job, Simulation, send
-    from discreta.sim.machine import device_blocks
+    from discreta.send import SIMULATED, Simulation, send
 
     simulated = {name: given.pop(name) for name in ("clocks_per_bit", "damage", "lose", "seed")}
     simulated = {name: value for name, value in simulated.items() if value is not None}
@@ -1538,13 +1601,8 @@ def send_command(
             )
     if baud is not None and port == SIMULATED:
         raise BadInputError(f"--baud is for a port, and {SIMULATED} is none: leave it out")
-    drive = _drive({**given}, {"plotter": None, "screen": None})
-    assert drive is not None
-    curve = Polyline(read_points(file, width))
-    curve.check(width)
     kind = picture_format("--plotter", plotter)
-    device = exact_device(width, curve.axes, kinds)
-    job = Job(device, device_blocks(device, curve, drive), drive)
+    job = _job(file, width, kinds, given)
     if port == SIMULATED:
         _needs_compiler()
     try:
