@@ -19,6 +19,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 import click
+from amaranth.hdl import Fragment
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -1508,9 +1509,12 @@ def _exact_device(width: int, axes: int, kinds: tuple[str, ...], used: list[str]
                 f"--kinds {','.join(kinds)}: the path has {kind}s: build the board with them"
             )
     try:
-        return exact_device(width, axes, kinds)
+        device = exact_device(width, axes, kinds)
     except ValueError as error:
         raise BadInputError(str(error)) from None
+    # It says what blocks are like, and often no hardware is made of it, which Amaranth warns of.
+    Fragment.get(device, None)
+    return device
 
 
 @cli.command("send", short_help="Send a path to a board, or to the simulated one.")

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from amaranth.hdl import Fragment
 
 from discreta.boards.host import Host, LinkError, Status
 from discreta.hdl.controller import Controller
@@ -83,8 +82,6 @@ def send(
         The board does not answer as it should, or the machine has stopped.
     """
     serial = _pyserial()
-    # It is made for what its blocks are like, and no hardware is made of it.
-    Fragment.get(job.device, None)
     try:
         line = serial.Serial(port, baud, timeout=_READ)
     except (OSError, ValueError) as error:

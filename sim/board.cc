@@ -21,7 +21,10 @@ bool find(cxxrtl_handle design, const char *name, Port *port) {
 	cxxrtl_object *object = cxxrtl_get(design, name);
 	if (object == nullptr || object->width > 32)
 		return false;
-	port->curr = object->curr;
+	// What is kept until a commit but is not a register would be a clock old.
+	const uint32_t kept = CXXRTL_DRIVEN_COMB | CXXRTL_DRIVEN_SYNC;
+	const bool fresh = object->next != nullptr && (object->flags & kept) == CXXRTL_DRIVEN_COMB;
+	port->curr = fresh ? object->next : object->curr;
 	port->next = object->next;
 	return true;
 }
@@ -46,13 +49,24 @@ struct Board {
 	unsigned heard = 0;
 	uint64_t look = 0;
 
+	// A clock is evaluated once, at its rising edge: until the new values of the registers are
+	// committed all that can be seen is what it is before the edge.
+	void settle() {
+		clk.next[0] = 0;
+		cxxrtl_commit(design);
+		clk.next[0] = 1;
+		cxxrtl_eval(design);
+	}
+
+	void edge() {
+		cxxrtl_commit(design);
+	}
+
 	void reset() {
 		rx.next[0] = 1;
 		rst.next[0] = 1;
-		clk.next[0] = 0;
-		cxxrtl_step(design);
-		clk.next[0] = 1;
-		cxxrtl_step(design);
+		settle();
+		edge();
 		rst.next[0] = 0;
 	}
 
@@ -167,8 +181,7 @@ void board_run(void *handle, Request *request) {
 		if (r.until_heard && r.heard_count >= r.until_heard)
 			break;
 		board.drive();
-		board.clk.next[0] = 0;
-		cxxrtl_step(board.design);
+		board.settle();
 		bool changed = board.levels.size() != pins;
 		board.levels.resize(pins);
 		for (size_t k = 0; k < pins; k++) {
@@ -184,8 +197,7 @@ void board_run(void *handle, Request *request) {
 		}
 		if (board.listen())
 			r.heard[r.heard_count++] = uint8_t(board.heard >> 1);
-		board.clk.next[0] = 1;
-		cxxrtl_step(board.design);
+		board.edge();
 		board.clock++;
 	}
 	r.clock = board.clock;
