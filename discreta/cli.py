@@ -19,6 +19,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 import click
+from amaranth.hdl import Fragment
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -38,18 +39,21 @@ from discreta.hdl.contract import (
     check_guard,
     check_width,
 )
+from discreta.hdl.device import Device, exact_device
 from discreta.hdl.harness import LoneAccumulator
 from discreta.hdl.parts import PRELOADS
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
+from discreta.hdl.queue import KINDS as CURVE_KINDS
 from discreta.hdl.verilog import verilog as emit_verilog
 from discreta.sim.carrier import DEFAULT_PERIOD, DEFAULT_SPEED, MAX_PERIOD
 from discreta.sim.compiled import compiler
 from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
 from discreta.sim.curves import Arc, Conic, Curve, Polyline
-from discreta.sim.gcode import IGNORABLE, SUFFIXES, is_gcode, read_moves
-from discreta.sim.machine import Drive
+from discreta.sim.gcode import IGNORABLE, SUFFIXES, Move, is_gcode, read_moves
+from discreta.sim.machine import Drive, device_blocks
 from discreta.sim.methods import DEFAULTS, METHODS, Design, Method
 from discreta.sim.outputs import Outputs
+from discreta.sim.plot import picture_format
 from discreta.sim.plotter import PulseTiming
 from discreta.sim.points import (
     MAX_TURNS,
@@ -60,7 +64,7 @@ from discreta.sim.points import (
     read_points,
     say_point,
 )
-from discreta.sim.program import CORES, Program, run_program, speeds
+from discreta.sim.program import CORES, Program, program_blocks, run_program, speeds
 from discreta.sim.run import run, say_choices
 from discreta.sim.simulate import ENGINES, DeadCoreError, default_engine
 from discreta.sim.synth import (
@@ -154,6 +158,34 @@ class _Speed(click.ParamType):
 
 #: The name of the family of the exact methods.
 _EXACT = "exact"
+
+
+class _Part(click.ParamType):
+    """A part of a whole: a number from 0 to less than 1."""
+
+    name = "PART"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+        if not _NUMBER.fullmatch(value) or not 0 <= Fraction(value) < 1:
+            self.fail(f"{value} is no part: choose a number from 0 to less than 1", param, ctx)
+        return float(Fraction(value))
+
+
+class _Kinds(click.ParamType):
+    """Kinds of curves that a device draws."""
+
+    name = "KINDS"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str, ...]:
+        kinds = tuple(dict.fromkeys(value.split(",")))
+        if not set(kinds) <= set(CURVE_KINDS):
+            self.fail(
+                f"{value!r} are no kinds: give one or more of {', '.join(CURVE_KINDS)} with commas "
+                "between",
+                param,
+                ctx,
+            )
+        return kinds
 
 
 class _MethodName(click.ParamType):
@@ -367,13 +399,7 @@ _timing_options = _options(
 
 #: What a run on the whole device is given; any of them asks for one.
 _DRIVE = ("feed", "accel", "pulse")
-_drive_options = _options(
-    click.option(
-        "--feed",
-        type=_Speed(),
-        help="Run on the whole device, at this speed along the path: steps per clock, up to 1, a "
-        "decimal or a fraction. [default: 1 with any of the four below]",
-    ),
+_DRIVE_CHOICES = (
     click.option(
         "--accel",
         type=_Numbers("an acceleration", "1e-6"),
@@ -388,6 +414,15 @@ _drive_options = _options(
         help="Clocks of the pulses: length, space behind, set-up and hold of the direction. "
         "[default: 1,1,1,1]",
     ),
+)
+_drive_options = _options(
+    click.option(
+        "--feed",
+        type=_Speed(),
+        help="Run on the whole device, at this speed along the path: steps per clock, up to 1, a "
+        "decimal or a fraction. [default: 1 with any of the four below]",
+    ),
+    *_DRIVE_CHOICES,
     click.option(
         "--plotter",
         metavar="FILE.svg|.png",
@@ -646,13 +681,35 @@ def simulate_path(file: str, width: int, **options: Any) -> None:
     if is_gcode(file):
         _simulate_program(file, width, program, options)
         return
+    _check_no_gcode(file, program)
+    _simulate(Polyline(read_points(file, width)), width=width, reads=(file,), **options)
+
+
+def _check_no_gcode(file: str, program: dict[str, Any]) -> None:
+    """Refuse options of G-code for a file that has none."""
     for name, value in program.items():
         if value:
             raise BadInputError(
                 f"--{name.replace('_', '-')} goes with G-code, and {file} is read as CSV: leave it "
                 f"out, or name a file that ends in {', '.join(SUFFIXES)}"
             )
-    _simulate(Polyline(read_points(file, width)), width=width, reads=(file,), **options)
+
+
+def _read_program(file: str, width: int, program: dict[str, Any]) -> list[Move]:
+    """Read a program in G-code."""
+    if program["steps_per_mm"] is None:
+        raise BadInputError(
+            f"{file} is in mm or inches: give --steps-per-mm, like --steps-per-mm 80"
+        )
+    return read_moves(file, program["steps_per_mm"], width, program["ignore"] or ())
+
+
+def _feeds(file: str, moves: list[Move], program: dict[str, Any]) -> list[Fraction]:
+    """Give the speed of every move of a program, in steps per clock."""
+    try:
+        return speeds(moves, program["clock"] * 10**6, program["rapid"])
+    except BadInputError as error:
+        raise BadInputError(f"{file}, {error}") from None
 
 
 def _simulate_program(
@@ -668,29 +725,21 @@ def _simulate_program(
             f"G-code runs on {' and '.join(core.name for core in CORES.values())}: leave out "
             "--method and --setting"
         )
-    steps_per_mm, clock, rapid = (program[name] for name in ("steps_per_mm", "clock", "rapid"))
-    if steps_per_mm is None:
-        raise BadInputError(
-            f"{file} is in mm or inches: give --steps-per-mm, like --steps-per-mm 80"
-        )
-    moves = read_moves(file, steps_per_mm, width, program["ignore"] or ())
+    moves = _read_program(file, width, program)
     device = {name: options.pop(name) for name in ("accel", "pulse")} | {"feed": None}
     asked = [
         f"--{name}"
         for name in ("rapid", "accel", "pulse", "plotter", "screen")
         if (program | device | options)[name] is not None
     ]
-    if clock is None and asked:
+    if program["clock"] is None and asked:
         raise BadInputError(
             f"{asked[0]} goes with the whole device, which turns mm a minute into clocks: give "
             "--clock, too"
         )
     drive, feeds = None, []
-    if clock is not None:
-        try:
-            feeds = speeds(moves, clock * 10**6, rapid)
-        except BadInputError as error:
-            raise BadInputError(f"{file}, {error}") from None
+    if program["clock"] is not None:
+        feeds = _feeds(file, moves, program)
         drive = _drive(device | {"feed": max(feeds)}, options)
     _run_shown(
         partial(run_program, Program(moves), width=width, drive=drive, feeds=feeds, reads=(file,)),
@@ -1406,6 +1455,188 @@ def stress_command(blocks: int, seed: int) -> None:
         table.add_row(name, value)
     _out().print(table)
     if not report.good:
+        raise click.exceptions.Exit(1)
+
+
+def _check_seed(seed: int) -> None:
+    if not 0 <= seed < 1 << 32:
+        raise ValueError(f"seed is {seed}: choose a whole number from 0 to {(1 << 32) - 1}")
+
+
+def _check_bits(clocks: int) -> None:
+    # Not needed by any other command.
+    from discreta.hdl.uart import check_clocks_per_bit
+
+    check_clocks_per_bit(clocks)
+
+
+def _job(file: str, width: int, kinds: tuple[str, ...], given: dict[str, Any]) -> Any:
+    """Give what a file has to be sent, with its speeds."""
+    from discreta.send import Job
+
+    program = {name: given.pop(name) for name in _GCODE}
+    pictures = {"plotter": None, "screen": None}
+    if not is_gcode(file):
+        _check_no_gcode(file, program)
+        if given["feed"] is None:
+            raise BadInputError("a path of support points has no speed: give --feed, like 1/100")
+        points = read_points(file, width)
+        curve = Polyline(points)
+        curve.check(width)
+        drive = cast(Drive, _drive(given, pictures))
+        device = _exact_device(width, curve.axes, kinds, ["line"])
+        return Job(device, device_blocks(device, curve, drive), drive)
+    if given["feed"] is not None:
+        raise BadInputError("--feed does not go with G-code, the speed is that of F: leave it out")
+    moves = _read_program(file, width, program)
+    if program["clock"] is None:
+        raise BadInputError("G-code has mm a minute: give --clock, that of the board, in MHz")
+    feeds = _feeds(file, moves, program)
+    drive = cast(Drive, _drive(given | {"feed": max(feeds)}, pictures))
+    whole = Program(moves)
+    used = sorted({move.kind for move in moves})
+    if "arc" in used and whole.axes > 2:
+        raise BadInputError(f"{file} has arcs and moves Z: leave Z out, or make the arcs of lines")
+    device = _exact_device(width, whole.axes, kinds, used)
+    return Job(device, program_blocks(device, whole, drive, feeds), drive)
+
+
+def _exact_device(width: int, axes: int, kinds: tuple[str, ...], used: list[str]) -> Device:
+    """Make a device like the board's, if it can draw what is used."""
+    for kind in used:
+        if kind not in kinds:
+            raise BadInputError(
+                f"--kinds {','.join(kinds)}: the path has {kind}s: build the board with them"
+            )
+    try:
+        device = exact_device(width, axes, kinds)
+    except ValueError as error:
+        raise BadInputError(str(error)) from None
+    # It says what blocks are like, and often no hardware is made of it, which Amaranth warns of.
+    Fragment.get(device, None)
+    return device
+
+
+@cli.command("send", short_help="Send a path to a board, or to the simulated one.")
+@click.argument("port", metavar="PORT")
+@click.argument("file", metavar="FILE")
+@click.option(
+    "--feed",
+    type=_Speed(),
+    help="CSV: speed along the path: steps per clock of the board, up to 1, a decimal or a "
+    "fraction.",
+)
+@_gcode_options
+@_options(*_DRIVE_CHOICES)
+@_width
+@click.option(
+    "--kinds",
+    type=_Kinds(),
+    default="line,arc",
+    show_default=True,
+    help="What the board draws, as it was built: of line, arc and conic.",
+)
+@click.option("--baud", type=click.IntRange(300), help="Of the port. [default: 115200]")
+@click.option(
+    "--clear",
+    is_flag=True,
+    help="Go on where the machine stands still for an emergency, a limit switch or a refused "
+    "block.",
+)
+@click.option(
+    "--clocks-per-bit",
+    type=_Number("clocks per bit", 4, 65536, _check_bits),
+    help="Of the simulated board. [default: 8]",
+)
+@click.option(
+    "--damage",
+    type=_Part(),
+    help="Of the line to the simulated board: the part of all bytes that arrive as others. "
+    "[default: 0]",
+)
+@click.option(
+    "--lose", type=_Part(), help="The part of all frames that do not arrive. [default: 0]"
+)
+@click.option(
+    "--seed", type=_Number("seed", 0, 2**32 - 1, _check_seed), help="Which ones. [default: 0]"
+)
+@click.option(
+    "--plotter",
+    metavar="FILE.svg|.png",
+    help="Picture of what a machine draws that sees only the simulated board's pins.",
+)
+@click.option("--json", "summary_file", metavar="FILE|-", help="The summary, as JSON.")
+def send_command(
+    port: str,
+    file: str,
+    width: int,
+    kinds: tuple[str, ...],
+    baud: int | None,
+    clear: bool,
+    plotter: str | None,
+    summary_file: str | None,
+    **given: Any,
+) -> None:
+    """Send a path to a board at a serial port, and wait until it is drawn.
+
+    FILE is G-code, which needs --steps-per-mm and --clock, or a CSV file of support points, which
+    needs --feed: as for `discreta simulate path`. The machine is said to stand at its start.
+
+    PORT is a serial port like /dev/ttyUSB0, or sim: for the simulated board: the RTL of the whole
+    controller, compiled, behind a pseudo-terminal, with a machine at its pins that sees nothing
+    else. Ctrl-C stops the machine down its ramp and tells where it stands. Exits 1 when the machine
+    has stopped before the end, the board does not answer, or the simulated machine was not just
+    where the golden models are.
+
+    \b
+    Example: discreta send sim: examples/bulgaria.csv --feed 1/4 \\
+                 --damage 0.01 --lose 0.01 --plotter sent.png
+    """
+    from discreta.boards.host import LinkError
+    from discreta.send import SIMULATED, Simulation, send
+
+    simulated = {name: given.pop(name) for name in ("clocks_per_bit", "damage", "lose", "seed")}
+    simulated = {name: value for name, value in simulated.items() if value is not None}
+    for name in (*simulated, *(["plotter"] if plotter else [])):
+        if port != SIMULATED:
+            raise BadInputError(
+                f"--{name.replace('_', '-')} is for the simulated board: give {SIMULATED} for the "
+                "port, or leave it out"
+            )
+    if baud is not None and port == SIMULATED:
+        raise BadInputError(f"--baud is for a port, and {SIMULATED} is none: leave it out")
+    kind = picture_format("--plotter", plotter)
+    job = _job(file, width, kinds, given)
+    if port == SIMULATED:
+        _needs_compiler()
+    try:
+        with Outputs((file,)) as outputs:
+            json_file = outputs.open(summary_file) if summary_file is not None else None
+            picture = outputs.place(plotter) if plotter is not None else None
+            with _progress("blocks", quiet=False) as show:
+                began = time.perf_counter()
+                good = True
+                if port == SIMULATED:
+                    board = Simulation(job, **simulated)
+                    try:
+                        summary = send(job, board.name, clear=clear, progress=show)
+                    finally:
+                        board.close()
+                    summary |= board.facts(summary)
+                    good = board.good
+                    if picture is not None:
+                        board.pen.draw(picture, kind, f"sent, {width} bits")
+                else:
+                    speed = {} if baud is None else {"baud": baud}
+                    summary = send(job, port, clear=clear, progress=show, **speed)
+            if json_file:
+                json.dump(summary, json_file, indent=2)
+                json_file.write("\n")
+    except LinkError as error:
+        _complain(str(error))
+        raise click.exceptions.Exit(1) from None
+    _print_summary(summary, time.perf_counter() - began, err=summary_file == "-")
+    if not good or "stopped" in summary:
         raise click.exceptions.Exit(1)
 
 

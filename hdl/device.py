@@ -7,17 +7,25 @@ from typing import Any
 
 from amaranth import Module, ResetInserter, Signal
 from amaranth.hdl import Value
-from amaranth.lib import stream
+from amaranth.lib import data, stream
 from amaranth.lib.wiring import In, Out
 
-from discreta.hdl.constant_speed import ConstantSpeed, constant_arc, constant_line
-from discreta.hdl.contract import Part, per_axis, point_layout
+from discreta.hdl.arc_input import arc_block_layout
+from discreta.hdl.conic import conic_block_layout
+from discreta.hdl.constant_speed import (
+    ConstantSpeed,
+    constant_arc,
+    constant_line,
+    constant_speed_layout,
+)
+from discreta.hdl.contract import Part, check_axes, check_width, per_axis, point_layout
 from discreta.hdl.exact_conic import ExactConic
 from discreta.hdl.feed import ACCELERATION_BITS, OVERRIDE_BITS, FeedUnit
 from discreta.hdl.pulse import TIMING_BITS, PulseUnit
-from discreta.hdl.queue import KINDS, BlockQueue, StopReason
+from discreta.hdl.quadrant import line_block_layout
+from discreta.hdl.queue import KINDS, BlockQueue, StopReason, device_block_layout
 
-__all__ = ["Device", "exact_device"]
+__all__ = ["Device", "exact_device", "exact_layout"]
 
 _TIMINGS = ("pulse_length", "pulse_space", "direction_setup", "direction_hold")
 
@@ -286,11 +294,7 @@ def exact_device(
     TypeError, ValueError
         A parameter is not one of the above.
     """
-    unknown = [kind for kind in kinds if kind not in KINDS]
-    if unknown or not kinds:
-        raise ValueError(f"kinds are {tuple(kinds)!r}: choose one or more of {', '.join(KINDS)}")
-    if "conic" in kinds and axes != 2:
-        raise ValueError(f"number of axes is {axes!r}: conics lie in a plane, choose 2")
+    _check_kinds(kinds, axes)
     parts: dict[str, Part] = {}
     if "line" in kinds:
         parts["line"] = constant_line(width, axes)
@@ -299,6 +303,29 @@ def exact_device(
     if "conic" in kinds:
         parts["conic"] = ExactConic(width)
     return Device(**parts, **choices)
+
+
+def exact_layout(
+    width: int = 16, axes: int = 2, kinds: Sequence[str] = ("line", "arc")
+) -> data.StructLayout:
+    """Lay out the blocks of :func:`exact_device` for whoever sends them and has none."""
+    check_width(width)
+    check_axes(axes)
+    _check_kinds(kinds, axes)
+    cores = {
+        "line": constant_speed_layout(line_block_layout(width, axes), width, axes),
+        "arc": constant_speed_layout(arc_block_layout(width), width, axes),
+        "conic": conic_block_layout(width),
+    }
+    return device_block_layout(width, axes, {kind: cores[kind] for kind in KINDS if kind in kinds})
+
+
+def _check_kinds(kinds: Sequence[str], axes: int) -> None:
+    """Raise ``ValueError`` unless there are exact interpolators of all these kinds."""
+    if not kinds or not set(kinds) <= set(KINDS):
+        raise ValueError(f"kinds are {tuple(kinds)!r}: choose one or more of {', '.join(KINDS)}")
+    if "conic" in kinds and axes != 2:
+        raise ValueError(f"number of axes is {axes!r}: conics lie in a plane, choose 2")
 
 
 def _shared(interpolators: dict[str, Part]) -> tuple[int, int]:

@@ -178,7 +178,7 @@ def program_blocks(
     fields = list(block_fields(device))
     blocks = np.zeros((1 + len(program.moves), len(fields)), dtype=np.int64)
     paths = np.zeros(len(program.moves))
-    for kind in device.interpolators:
+    for kind in [kind for kind in device.interpolators if len(program.which(kind))]:
         part = _Part(kind, program.axes, program.start, program.blocks(kind))
         made = device_blocks(device, part, drive)
         blocks[0] = made[0]
