@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from amaranth.hdl import Fragment
 
 from discreta.hdl.line_device import PERIOD_BITS, LineDevice
 from discreta.hdl.plain import PlainPorts
@@ -245,6 +246,7 @@ def test_a_line_that_is_too_long_is_refused():
 
 def test_registers_are_those_of_its_parts():
     core = LineDevice(WIDTH)
+    Fragment.get(core, None)  # else Amaranth complains that its parts are not used
     inside = {id(it) for part in (core.pulse, core.line) for it in part.registers.values()}
     own = {name for name, it in core.registers.items() if id(it) not in inside}
     assert own == {"period", "pause", "reason"}
