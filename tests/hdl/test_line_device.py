@@ -248,6 +248,37 @@ def test_no_step_towards_a_limit_switch(switch, end):
     on(bench)
 
 
+@pytest.mark.parametrize("contact", [1, 2, 3])
+def test_a_step_that_a_switch_has_held_never_leaves(contact):
+    """However short its contact is, at whatever time of the period."""
+    hit = []
+
+    async def bench(machine):
+        for phase in range(12):
+            await machine.offer(40, 0, 10)
+            await machine.tick(60 + phase)
+            at = machine.clock
+            machine.set(high_limit_x=1)
+            await machine.tick(contact)
+            machine.set(high_limit_x=0)
+            await machine.tick(30)
+            hit.append(machine.get("reason") == REASONS["LIMIT"])
+            assert (machine.steps[-1][0] <= at + 1) == hit[-1]
+            if not hit[-1]:
+                machine.set(stop=1)
+                await machine.tick()
+                machine.set(stop=0)
+                await machine.tick(20)
+            machine.set(clear=1)
+            await machine.tick()
+            machine.set(clear=0)
+            await machine.offer(0, 0, 0)
+            await machine.rest()
+
+    on(bench)
+    assert {*hit} == {False, True}
+
+
 def test_a_line_that_is_too_long_is_refused():
     async def bench(machine):
         await machine.offer(-60, 0, 0)
