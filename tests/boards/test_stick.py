@@ -29,11 +29,11 @@ def test_lines_over_the_link():
     port = BoardPort(board)
     host = Host(port, line_device_layout(WIDTH), WIDTH, 2, clock=port.time)
     host.open()
-    for *end, period in BLOCKS:
-        host.send([(*end, period)])
+    for x, y, period in BLOCKS:
+        host.send([(x, y, period)])
         status = host.wait()
-        assert status.position == tuple(end) == (pulses["x"], pulses["y"])
-    assert status.reason is StopReason.NONE
+        assert status.reason is StopReason.NONE
+        assert status.position == (x, y) == (pulses["x"], pulses["y"])
     # The button, on the way.
     host.send([(300, 0, 500)])
     board.switch("emergency", 1)
