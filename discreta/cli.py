@@ -13,9 +13,11 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from fractions import Fraction
 from functools import partial
+from hashlib import sha256
 from importlib import metadata
 from io import TextIOWrapper
 from itertools import chain
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 import click
@@ -24,6 +26,10 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from discreta.boards.board import Board, constraints
+from discreta.boards.catalogue import BOARDS
+from discreta.boards.project import project
+from discreta.boards.top import Top
 from discreta.hdl.carrier_circular import FORMULAS
 from discreta.hdl.comparison import FIRSTS, FORMS
 from discreta.hdl.conic import MAX_WIDTH as CONIC_MAX_WIDTH
@@ -45,10 +51,14 @@ from discreta.hdl.parts import PRELOADS
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
 from discreta.hdl.queue import KINDS as CURVE_KINDS
 from discreta.hdl.verilog import verilog as emit_verilog
+from discreta.sim.bitstream import RUNS as BUILD_RUNS
+from discreta.sim.bitstream import SEEDS as BUILD_SEEDS
+from discreta.sim.bitstream import Bitstream, build
 from discreta.sim.carrier import DEFAULT_PERIOD, DEFAULT_SPEED, MAX_PERIOD
 from discreta.sim.compiled import compiler
 from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
 from discreta.sim.curves import Arc, Conic, Curve, Polyline
+from discreta.sim.fpga import FPGAS, SynthesisError, check_tools
 from discreta.sim.gcode import IGNORABLE, SUFFIXES, Move, is_gcode, read_moves
 from discreta.sim.machine import Drive, device_blocks
 from discreta.sim.methods import DEFAULTS, METHODS, Design, Method
@@ -67,14 +77,7 @@ from discreta.sim.points import (
 from discreta.sim.program import CORES, Program, program_blocks, run_program, speeds
 from discreta.sim.run import run, say_choices
 from discreta.sim.simulate import ENGINES, DeadCoreError, default_engine
-from discreta.sim.synth import (
-    DEVICES,
-    RUNS,
-    Measurement,
-    SynthesisError,
-    check_tools,
-    measure,
-)
+from discreta.sim.synth import RUNS, Measurement, measure
 
 if TYPE_CHECKING:
     from discreta.sim.groups import Group
@@ -1006,8 +1009,8 @@ def verilog(method: Design, width: int, axes: int, setting: str, output: str, **
 @_width
 @click.option(
     "--device",
-    type=click.Choice(tuple(DEVICES)),
-    default=next(iter(DEVICES)),
+    type=click.Choice(tuple(FPGAS)),
+    default=next(iter(FPGAS)),
     show_default=True,
     help="The FPGA.",
 )
@@ -1061,7 +1064,7 @@ def synth_command(
             ]
             json.dump({"device": device, "width": width, "cores": found}, file, indent=2)
             file.write("\n")
-    title = f"{DEVICES[device].title}, width {width}"
+    title = f"{FPGAS[device].title}, width {width}"
     _print_measurements(title, list(zip(names, rows, strict=True)), err=json_file == "-")
     if any(row.problem for row in rows):
         raise click.exceptions.Exit(1)
@@ -1100,8 +1103,8 @@ def _print_measurements(title: str, rows: list[tuple[str, Measurement]], *, err:
 @_width
 @click.option(
     "--device",
-    type=click.Choice(tuple(DEVICES)),
-    default=next(iter(DEVICES)),
+    type=click.Choice(tuple(FPGAS)),
+    default=next(iter(FPGAS)),
     show_default=True,
     help="The FPGA.",
 )
@@ -1148,7 +1151,7 @@ def compare_command(methods: tuple[Method, ...], width: int, device: str) -> Non
             "-" if speed is None else f"{speed:,.0f}",
         )
     out = _out()
-    out.print(f"{DEVICES[device].title}, width {width}")
+    out.print(f"{FPGAS[device].title}, width {width}")
     out.print(table)
     if not all(row.sound and not row.cells.problem for row in rows):
         raise click.exceptions.Exit(1)
@@ -1638,6 +1641,172 @@ def send_command(
     _print_summary(summary, time.perf_counter() - began, err=summary_file == "-")
     if not good or "stopped" in summary:
         raise click.exceptions.Exit(1)
+
+
+#: nextpnr takes seeds of 32 bits, and calls every one of less than 1 the same.
+_MAX_SEED = 2**31 - 1
+
+
+def _check_placement_seed(seed: int) -> None:
+    if not 1 <= seed <= _MAX_SEED:
+        raise ValueError(f"seed is {seed}: choose a whole number from 1 to {_MAX_SEED}")
+
+
+class _BoardName(click.ParamType):
+    """The name of a board."""
+
+    name = "BOARD"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Board:
+        if value not in BOARDS:
+            self.fail(f"there is no board {value!r}: choose {' or '.join(BOARDS)}", param, ctx)
+        return BOARDS[value]
+
+
+@cli.command("boards", short_help="The boards there are, and their pins.")
+@click.argument("board", type=_BoardName(), required=False)
+def boards_command(board: Board | None) -> None:
+    """List the boards there are; with BOARD: what each of its pins is for.
+
+    Example: discreta boards icebreaker
+    """
+    out = _out()
+    if board is None:
+        table = _table(("board", "is", "draws", "clock"), 3)
+        for each in BOARDS.values():
+            table.add_row(each.name, each.title, each.draws, f"{each.clock / 1e6:g} MHz")
+        out.print(table)
+        return
+    out.print(f"{board.title}, serial link at {board.baud} baud")
+    table = _table(("port", "is", "on the board", "pin of the FPGA", "", "volts"), 5)
+    for pin in board.pins:
+        table.add_row(*pin.row())
+    out.print(table)
+
+
+@cli.command("build", short_help="Make the bits of a board, checked against its clock.")
+@click.argument("board", type=_BoardName())
+@click.option(
+    "--output",
+    metavar="FILE|FOLDER",
+    help="The bits, or the folder of a project.  [default: named after the board]",
+)
+@click.option(
+    "--seed",
+    type=_Number("seed", 1, _MAX_SEED, _check_placement_seed),
+    help="That of the placement.  [default: the first of 1 to 5 that reaches the clock]",
+)
+@click.option(
+    "--normally-closed",
+    is_flag=True,
+    help="Limit and stop switches open when they act; else they close to ground.",
+)
+@click.option("--json", "json_file", metavar="FILE|-", help="What is printed, as JSON.")
+def build_command(
+    board: Board,
+    output: str | None,
+    seed: int | None,
+    normally_closed: bool,
+    json_file: str | None,
+) -> None:
+    """Make the bits of a board: the device, its serial link, and the board's pins.
+
+    Prints the cells that it takes, and how much faster than the board's clock it could run. Exits 1
+    when it does not fit or does not reach that clock. The same seed gives the same bits on every
+    machine. For arty-a7, which needs Vivado, it writes a project and builds nothing.
+
+    Example: discreta build icebreaker
+    """
+    if board.fpga not in FPGAS:
+        if seed is not None or json_file is not None:
+            raise BadInputError(f"{board.name} is not built here: leave out --seed and --json")
+        _write_project(board, output or board.name, normally_closed)
+        return
+    fpga = FPGAS[board.fpga]
+    path = output or f"{board.name}.{fpga.tools.bits}"
+    done = 0
+
+    def progress() -> None:
+        nonlocal done
+        done += 1
+        show(done, max(done, BUILD_RUNS))
+
+    with Outputs() as outputs, _progress("runs", quiet=json_file == "-") as show:
+        place = outputs.place(path)
+        file = None if json_file is None else outputs.open(json_file)
+        show(0, BUILD_RUNS)
+        try:
+            check_tools(board.fpga, packs=True)
+            top = Top(board, normally_closed=normally_closed)
+            made = build(
+                top,
+                top.ports.values(),
+                board.fpga,
+                constraints(board, fpga.tools.constraints),
+                board.clock / 1e6,
+                BUILD_SEEDS if seed is None else (seed,),
+                progress=progress,
+            )
+        except ModuleNotFoundError as error:
+            raise BadInputError(
+                f"a build needs {error.name}: install the extra, pip install 'discreta[boards]'"
+            ) from None
+        except SynthesisError as error:
+            raise SynthesisError(f"{board.name}: {error}") from None
+        place.write_bytes(made.bits)
+        summary = {
+            "board": board.name,
+            "draws": board.draws,
+            "seed": made.seed,
+            "clock": made.clock,
+            "fastest": made.fmax,
+            "margin": made.margin,
+            "used": made.used,
+            "available": made.available,
+            "bytes": len(made.bits),
+            "sha256": sha256(made.bits).hexdigest(),
+        }
+        if file is not None:
+            json.dump(summary, file, indent=2)
+            file.write("\n")
+    _print_build(board, path, made, summary["sha256"], err=json_file == "-")
+
+
+def _print_build(board: Board, path: str, made: Bitstream, digest: str, *, err: bool) -> None:
+    """Print what bits take of their board."""
+    out = _out(err=err)
+    out.print(f"{board.title}: {board.draws}")
+    table = _table(("", "used", "there", "%"))
+    for what, used in made.used.items():
+        there = made.available[what]
+        share = f"{100 * used / there:.0f}" if there else "-"
+        table.add_row(what, str(used), str(there), share)
+    out.print(table)
+    out.print(
+        f"clock {made.clock:g} MHz, {made.fmax:.2f} reached: margin {made.margin:.0f} %, "
+        f"seed {made.seed}"
+    )
+    out.print(f"{path}: {len(made.bits)} bytes, sha256 {digest}")
+    out.print(f"load it: {board.load.format(path)}")
+
+
+def _write_project(board: Board, folder: str, normally_closed: bool) -> None:
+    """Write a project for a board that is not built here."""
+    texts = project(board, Top(board, normally_closed=normally_closed))
+    fresh = not os.path.lexists(folder)
+    Path(folder).mkdir(exist_ok=True)
+    try:
+        with Outputs() as outputs:
+            for name, text in texts.items():
+                outputs.open(str(Path(folder, name))).write(text)
+    except BaseException:
+        if fresh:
+            Path(folder).rmdir()
+        raise
+    click.echo(
+        f"{board.title} is not built here: {folder} has a project for Vivado, "
+        "vivado -mode batch -source build.tcl"
+    )
 
 
 @cli.command("methods")

@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 
 from discreta.hdl.contract import Part, per_axis
 from discreta.hdl.device import Device
+from discreta.hdl.line_device import LineDevice
 from discreta.hdl.link import Link
 from discreta.hdl.queue import StopReason
 from discreta.hdl.uart import UartReceiver, UartTransmitter, check_clocks_per_bit
@@ -39,13 +40,13 @@ class Controller(Part):
 
     Parameters
     ----------
-    device : Device
+    device : Device or LineDevice
     clocks_per_bit : int
         Of the serial line, 4 to 65536.
 
     Attributes
     ----------
-    device : Device
+    device : Device or LineDevice
     link : Link
     parameters : dict of str to object
         The parameters it was made with.
@@ -60,8 +61,8 @@ class Controller(Part):
         The device is none, or the clocks are out of range.
     """
 
-    def __init__(self, device: Device, clocks_per_bit: int):
-        if not isinstance(device, Device):
+    def __init__(self, device: Device | LineDevice, clocks_per_bit: int):
+        if not isinstance(device, Device | LineDevice):
             raise TypeError(f"device must be a Device, not {device!r}")
         check_clocks_per_bit(clocks_per_bit)
         flags = per_axis(device.axes, 1)
@@ -78,7 +79,7 @@ class Controller(Part):
         )
         self.device = device
         self.clocks_per_bit = clocks_per_bit
-        self.link = Link(device.queue.layout, device.width, device.axes, device.queue.depth)
+        self.link = Link(device.blocks.payload.shape(), device.width, device.axes, device.depth)
         self.receiver = UartReceiver(clocks_per_bit)
         self.transmitter = UartTransmitter(clocks_per_bit)
         self.parameters: dict[str, object] = {

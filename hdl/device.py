@@ -82,7 +82,7 @@ class Device(Part):
         The interpolators, of the same width and number of axes, without a carrier; at least one.
     depth : int
         Blocks that the queue holds, 1 to 4096.
-    pauses, pairing
+    pauses, pairing, multiplier
         Of the feed unit.
     pins : str
         ``"step_direction"`` or ``"quadrature"``.
@@ -118,6 +118,7 @@ class Device(Part):
         depth: int = 16,
         pauses: Sequence[int] | None = None,
         pairing: bool = True,
+        multiplier: bool = False,
         pins: str = "step_direction",
         inverted_steps: str = "",
         inverted_directions: str = "",
@@ -127,12 +128,13 @@ class Device(Part):
         width, axes = _shared(self.interpolators)
         self.width = width
         self.axes = axes
+        self.depth = depth
         layouts = {kind: part.blocks.payload.shape() for kind, part in self.interpolators.items()}
         steady = [
             kind for kind, part in self.interpolators.items() if isinstance(part, ConstantSpeed)
         ]
         self.queue = BlockQueue(width, axes, layouts, depth, steady=steady)
-        self.feed = FeedUnit(axes, pauses=pauses, pairing=pairing)
+        self.feed = FeedUnit(axes, pauses=pauses, pairing=pairing, multiplier=multiplier)
         self.pulse = PulseUnit(
             width,
             axes,
@@ -168,6 +170,7 @@ class Device(Part):
             "depth": depth,
             "pauses": self.feed.pauses,
             "pairing": pairing,
+            "multiplier": multiplier,
             "pins": pins,
             "inverted_steps": inverted_steps,
             "inverted_directions": inverted_directions,

@@ -1047,6 +1047,7 @@ def test_parameters_and_registers():
         "depth": 4,
         "pauses": (256, 362),
         "pairing": True,
+        "multiplier": False,
         "pins": "quadrature",
         "inverted_steps": "",
         "inverted_directions": "",

@@ -102,11 +102,12 @@ SETTINGS = [
 ]
 
 
+@pytest.mark.parametrize("multiplier", [False, True])
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
-def test_every_register_is_the_golden_models(setting):
+def test_every_register_is_the_golden_models(setting, multiplier):
     axes, pauses, pairing = setting
-    golden = Golden(axes, pauses, pairing)
-    core, drive = FeedUnit(axes, pauses=pauses, pairing=pairing), random_drive(axes, 7)
+    golden, drive = Golden(axes, pauses, pairing), random_drive(axes, 7)
+    core = FeedUnit(axes, pauses=pauses, pairing=pairing, multiplier=multiplier)
     idle = dict.fromkeys(PlainPorts(core).inputs, 0)
     given = []
 
@@ -306,7 +307,12 @@ def test_registers_hold_every_flip_flop(setting):
         *setting
     ).registers()
     assert list(core.registers) == [it.name for group in core.diagram.values() for it in group]
-    assert core.parameters == {"axes": axes, "pauses": pauses, "pairing": pairing}
+    assert core.parameters == {
+        "axes": axes,
+        "pauses": pauses,
+        "pairing": pairing,
+        "multiplier": False,
+    }
 
 
 def test_pauses_are_roots():
@@ -319,6 +325,8 @@ def test_refuses_other_parameters():
         assert_refused((error, message), FeedUnit, axes)
     message = "pairing must be True or False, not 1"
     assert_refused((TypeError, message), FeedUnit, pairing=1)
+    message = "multiplier must be True or False, not 1"
+    assert_refused((TypeError, message), FeedUnit, multiplier=1)
     for pauses in ((256, 358.4), (256, "362"), (True, 362)):
         message = f"pauses must be whole numbers of 1/256, not {pauses!r}"
         assert_refused((TypeError, message), FeedUnit, pauses=pauses)
