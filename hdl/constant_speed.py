@@ -148,7 +148,6 @@ class ConstantSpeed(Part):
             }
         )
         self.core = core
-        self.restart = core.restart
         self.width = width
         self.axes = axes
         self.letters = AXIS_LETTERS[:axes]

@@ -66,9 +66,6 @@ class Part(wiring.Component):
     intermediates : dict of str to Signal
         Signals between the registers, by names that the golden model has for them too: a proof of
         equality goes over them. Empty where it needs none.
-    restart : Signal or None
-        Must be 1 whenever a ``ResetInserter`` around the part resets it, because registers are
-        reset by hand in it; None where the inserter alone does.
     """
 
     notation: ClassVar[str] = ""
@@ -76,7 +73,6 @@ class Part(wiring.Component):
     def __init__(self, signature: Any):
         super().__init__(signature)
         self.intermediates: dict[str, Signal] = {}
-        self.restart: Signal | None = None
 
     if TYPE_CHECKING:
         # The members are made from the signature when the part is made.

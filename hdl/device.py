@@ -207,8 +207,6 @@ class Device(Part):
         m.submodules.pulse = pulse
         for kind, part in self.interpolators.items():
             m.submodules[kind] = ResetInserter(stands)(part)
-            if part.restart is not None:
-                m.d.comb += part.restart.eq(stands)
             offered, steps = getattr(queue, f"{kind}_blocks"), getattr(queue, f"{kind}_steps")
             m.d.comb += [
                 part.blocks.payload.eq(offered.payload),
