@@ -927,12 +927,6 @@ def ticks_paid_as_steps(device, m):
 
 
 @broken
-def interpolator_kept(device, m):
-    """What an arc resets by hand is not reset while the device stands."""
-    m.d.comb += device.interpolators["arc"].restart.eq(0)
-
-
-@broken
 def hold_ignored(device, m):
     """`hold` does not come to the feed unit."""
     m.d.comb += device.feed.hold.eq(device.stop_asked)
