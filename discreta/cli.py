@@ -13,16 +13,23 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from fractions import Fraction
 from functools import partial
+from hashlib import sha256
 from importlib import metadata
 from io import TextIOWrapper
 from itertools import chain
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 import click
+from amaranth.hdl import Fragment
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from discreta.boards.board import Board, constraints
+from discreta.boards.catalogue import BOARDS
+from discreta.boards.project import project
+from discreta.boards.top import Top
 from discreta.hdl.carrier_circular import FORMULAS
 from discreta.hdl.comparison import FIRSTS, FORMS
 from discreta.hdl.conic import MAX_WIDTH as CONIC_MAX_WIDTH
@@ -38,18 +45,25 @@ from discreta.hdl.contract import (
     check_guard,
     check_width,
 )
+from discreta.hdl.device import Device, exact_device
 from discreta.hdl.harness import LoneAccumulator
 from discreta.hdl.parts import PRELOADS
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
+from discreta.hdl.queue import KINDS as CURVE_KINDS
 from discreta.hdl.verilog import verilog as emit_verilog
+from discreta.sim.bitstream import RUNS as BUILD_RUNS
+from discreta.sim.bitstream import SEEDS as BUILD_SEEDS
+from discreta.sim.bitstream import Bitstream, build
 from discreta.sim.carrier import DEFAULT_PERIOD, DEFAULT_SPEED, MAX_PERIOD
 from discreta.sim.compiled import compiler
 from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
 from discreta.sim.curves import Arc, Conic, Curve, Polyline
-from discreta.sim.gcode import IGNORABLE, SUFFIXES, is_gcode, read_moves
-from discreta.sim.machine import Drive
+from discreta.sim.fpga import FPGAS, SynthesisError, check_tools
+from discreta.sim.gcode import IGNORABLE, SUFFIXES, Move, is_gcode, read_moves
+from discreta.sim.machine import Drive, device_blocks
 from discreta.sim.methods import DEFAULTS, METHODS, Design, Method
 from discreta.sim.outputs import Outputs
+from discreta.sim.plot import picture_format
 from discreta.sim.plotter import PulseTiming
 from discreta.sim.points import (
     MAX_TURNS,
@@ -60,17 +74,10 @@ from discreta.sim.points import (
     read_points,
     say_point,
 )
-from discreta.sim.program import CORES, Program, run_program, speeds
+from discreta.sim.program import CORES, Program, program_blocks, run_program, speeds
 from discreta.sim.run import run, say_choices
 from discreta.sim.simulate import ENGINES, DeadCoreError, default_engine
-from discreta.sim.synth import (
-    DEVICES,
-    RUNS,
-    Measurement,
-    SynthesisError,
-    check_tools,
-    measure,
-)
+from discreta.sim.synth import RUNS, Measurement, measure
 
 if TYPE_CHECKING:
     from discreta.sim.groups import Group
@@ -154,6 +161,34 @@ class _Speed(click.ParamType):
 
 #: The name of the family of the exact methods.
 _EXACT = "exact"
+
+
+class _Part(click.ParamType):
+    """A part of a whole: a number from 0 to less than 1."""
+
+    name = "PART"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+        if not _NUMBER.fullmatch(value) or not 0 <= Fraction(value) < 1:
+            self.fail(f"{value} is no part: choose a number from 0 to less than 1", param, ctx)
+        return float(Fraction(value))
+
+
+class _Kinds(click.ParamType):
+    """Kinds of curves that a device draws."""
+
+    name = "KINDS"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str, ...]:
+        kinds = tuple(dict.fromkeys(value.split(",")))
+        if not set(kinds) <= set(CURVE_KINDS):
+            self.fail(
+                f"{value!r} are no kinds: give one or more of {', '.join(CURVE_KINDS)} with commas "
+                "between",
+                param,
+                ctx,
+            )
+        return kinds
 
 
 class _MethodName(click.ParamType):
@@ -367,13 +402,7 @@ _timing_options = _options(
 
 #: What a run on the whole device is given; any of them asks for one.
 _DRIVE = ("feed", "accel", "pulse")
-_drive_options = _options(
-    click.option(
-        "--feed",
-        type=_Speed(),
-        help="Run on the whole device, at this speed along the path: steps per clock, up to 1, a "
-        "decimal or a fraction. [default: 1 with any of the four below]",
-    ),
+_DRIVE_CHOICES = (
     click.option(
         "--accel",
         type=_Numbers("an acceleration", "1e-6"),
@@ -388,6 +417,15 @@ _drive_options = _options(
         help="Clocks of the pulses: length, space behind, set-up and hold of the direction. "
         "[default: 1,1,1,1]",
     ),
+)
+_drive_options = _options(
+    click.option(
+        "--feed",
+        type=_Speed(),
+        help="Run on the whole device, at this speed along the path: steps per clock, up to 1, a "
+        "decimal or a fraction. [default: 1 with any of the four below]",
+    ),
+    *_DRIVE_CHOICES,
     click.option(
         "--plotter",
         metavar="FILE.svg|.png",
@@ -646,13 +684,35 @@ def simulate_path(file: str, width: int, **options: Any) -> None:
     if is_gcode(file):
         _simulate_program(file, width, program, options)
         return
+    _check_no_gcode(file, program)
+    _simulate(Polyline(read_points(file, width)), width=width, reads=(file,), **options)
+
+
+def _check_no_gcode(file: str, program: dict[str, Any]) -> None:
+    """Refuse options of G-code for a file that has none."""
     for name, value in program.items():
         if value:
             raise BadInputError(
                 f"--{name.replace('_', '-')} goes with G-code, and {file} is read as CSV: leave it "
                 f"out, or name a file that ends in {', '.join(SUFFIXES)}"
             )
-    _simulate(Polyline(read_points(file, width)), width=width, reads=(file,), **options)
+
+
+def _read_program(file: str, width: int, program: dict[str, Any]) -> list[Move]:
+    """Read a program in G-code."""
+    if program["steps_per_mm"] is None:
+        raise BadInputError(
+            f"{file} is in mm or inches: give --steps-per-mm, like --steps-per-mm 80"
+        )
+    return read_moves(file, program["steps_per_mm"], width, program["ignore"] or ())
+
+
+def _feeds(file: str, moves: list[Move], program: dict[str, Any]) -> list[Fraction]:
+    """Give the speed of every move of a program, in steps per clock."""
+    try:
+        return speeds(moves, program["clock"] * 10**6, program["rapid"])
+    except BadInputError as error:
+        raise BadInputError(f"{file}, {error}") from None
 
 
 def _simulate_program(
@@ -668,29 +728,21 @@ def _simulate_program(
             f"G-code runs on {' and '.join(core.name for core in CORES.values())}: leave out "
             "--method and --setting"
         )
-    steps_per_mm, clock, rapid = (program[name] for name in ("steps_per_mm", "clock", "rapid"))
-    if steps_per_mm is None:
-        raise BadInputError(
-            f"{file} is in mm or inches: give --steps-per-mm, like --steps-per-mm 80"
-        )
-    moves = read_moves(file, steps_per_mm, width, program["ignore"] or ())
+    moves = _read_program(file, width, program)
     device = {name: options.pop(name) for name in ("accel", "pulse")} | {"feed": None}
     asked = [
         f"--{name}"
         for name in ("rapid", "accel", "pulse", "plotter", "screen")
         if (program | device | options)[name] is not None
     ]
-    if clock is None and asked:
+    if program["clock"] is None and asked:
         raise BadInputError(
             f"{asked[0]} goes with the whole device, which turns mm a minute into clocks: give "
             "--clock, too"
         )
     drive, feeds = None, []
-    if clock is not None:
-        try:
-            feeds = speeds(moves, clock * 10**6, rapid)
-        except BadInputError as error:
-            raise BadInputError(f"{file}, {error}") from None
+    if program["clock"] is not None:
+        feeds = _feeds(file, moves, program)
         drive = _drive(device | {"feed": max(feeds)}, options)
     _run_shown(
         partial(run_program, Program(moves), width=width, drive=drive, feeds=feeds, reads=(file,)),
@@ -957,8 +1009,8 @@ def verilog(method: Design, width: int, axes: int, setting: str, output: str, **
 @_width
 @click.option(
     "--device",
-    type=click.Choice(tuple(DEVICES)),
-    default=next(iter(DEVICES)),
+    type=click.Choice(tuple(FPGAS)),
+    default=next(iter(FPGAS)),
     show_default=True,
     help="The FPGA.",
 )
@@ -1012,7 +1064,7 @@ def synth_command(
             ]
             json.dump({"device": device, "width": width, "cores": found}, file, indent=2)
             file.write("\n")
-    title = f"{DEVICES[device].title}, width {width}"
+    title = f"{FPGAS[device].title}, width {width}"
     _print_measurements(title, list(zip(names, rows, strict=True)), err=json_file == "-")
     if any(row.problem for row in rows):
         raise click.exceptions.Exit(1)
@@ -1051,8 +1103,8 @@ def _print_measurements(title: str, rows: list[tuple[str, Measurement]], *, err:
 @_width
 @click.option(
     "--device",
-    type=click.Choice(tuple(DEVICES)),
-    default=next(iter(DEVICES)),
+    type=click.Choice(tuple(FPGAS)),
+    default=next(iter(FPGAS)),
     show_default=True,
     help="The FPGA.",
 )
@@ -1099,7 +1151,7 @@ def compare_command(methods: tuple[Method, ...], width: int, device: str) -> Non
             "-" if speed is None else f"{speed:,.0f}",
         )
     out = _out()
-    out.print(f"{DEVICES[device].title}, width {width}")
+    out.print(f"{FPGAS[device].title}, width {width}")
     out.print(table)
     if not all(row.sound and not row.cells.problem for row in rows):
         raise click.exceptions.Exit(1)
@@ -1407,6 +1459,354 @@ def stress_command(blocks: int, seed: int) -> None:
     _out().print(table)
     if not report.good:
         raise click.exceptions.Exit(1)
+
+
+def _check_seed(seed: int) -> None:
+    if not 0 <= seed < 1 << 32:
+        raise ValueError(f"seed is {seed}: choose a whole number from 0 to {(1 << 32) - 1}")
+
+
+def _check_bits(clocks: int) -> None:
+    # Not needed by any other command.
+    from discreta.hdl.uart import check_clocks_per_bit
+
+    check_clocks_per_bit(clocks)
+
+
+def _job(file: str, width: int, kinds: tuple[str, ...], given: dict[str, Any]) -> Any:
+    """Give what a file has to be sent, with its speeds."""
+    from discreta.send import Job
+
+    program = {name: given.pop(name) for name in _GCODE}
+    pictures = {"plotter": None, "screen": None}
+    if not is_gcode(file):
+        _check_no_gcode(file, program)
+        if given["feed"] is None:
+            raise BadInputError("a path of support points has no speed: give --feed, like 1/100")
+        points = read_points(file, width)
+        curve = Polyline(points)
+        curve.check(width)
+        drive = cast(Drive, _drive(given, pictures))
+        device = _exact_device(width, curve.axes, kinds, ["line"])
+        return Job(device, device_blocks(device, curve, drive), drive)
+    if given["feed"] is not None:
+        raise BadInputError("--feed does not go with G-code, the speed is that of F: leave it out")
+    moves = _read_program(file, width, program)
+    if program["clock"] is None:
+        raise BadInputError("G-code has mm a minute: give --clock, that of the board, in MHz")
+    feeds = _feeds(file, moves, program)
+    drive = cast(Drive, _drive(given | {"feed": max(feeds)}, pictures))
+    whole = Program(moves)
+    used = sorted({move.kind for move in moves})
+    if "arc" in used and whole.axes > 2:
+        raise BadInputError(f"{file} has arcs and moves Z: leave Z out, or make the arcs of lines")
+    device = _exact_device(width, whole.axes, kinds, used)
+    return Job(device, program_blocks(device, whole, drive, feeds), drive)
+
+
+def _exact_device(width: int, axes: int, kinds: tuple[str, ...], used: list[str]) -> Device:
+    """Make a device like the board's, if it can draw what is used."""
+    for kind in used:
+        if kind not in kinds:
+            raise BadInputError(
+                f"--kinds {','.join(kinds)}: the path has {kind}s: build the board with them"
+            )
+    try:
+        device = exact_device(width, axes, kinds)
+    except ValueError as error:
+        raise BadInputError(str(error)) from None
+    # It says what blocks are like, and often no hardware is made of it, which Amaranth warns of.
+    Fragment.get(device, None)
+    return device
+
+
+@cli.command("send", short_help="Send a path to a board, or to the simulated one.")
+@click.argument("port", metavar="PORT")
+@click.argument("file", metavar="FILE")
+@click.option(
+    "--feed",
+    type=_Speed(),
+    help="CSV: speed along the path: steps per clock of the board, up to 1, a decimal or a "
+    "fraction.",
+)
+@_gcode_options
+@_options(*_DRIVE_CHOICES)
+@_width
+@click.option(
+    "--kinds",
+    type=_Kinds(),
+    default="line,arc",
+    show_default=True,
+    help="What the board draws, as it was built: of line, arc and conic.",
+)
+@click.option("--baud", type=click.IntRange(300), help="Of the port. [default: 115200]")
+@click.option(
+    "--clear",
+    is_flag=True,
+    help="Go on where the machine stands still for an emergency, a limit switch or a refused "
+    "block.",
+)
+@click.option(
+    "--clocks-per-bit",
+    type=_Number("clocks per bit", 4, 65536, _check_bits),
+    help="Of the simulated board. [default: 8]",
+)
+@click.option(
+    "--damage",
+    type=_Part(),
+    help="Of the line to the simulated board: the part of all bytes that arrive as others. "
+    "[default: 0]",
+)
+@click.option(
+    "--lose", type=_Part(), help="The part of all frames that do not arrive. [default: 0]"
+)
+@click.option(
+    "--seed", type=_Number("seed", 0, 2**32 - 1, _check_seed), help="Which ones. [default: 0]"
+)
+@click.option(
+    "--plotter",
+    metavar="FILE.svg|.png",
+    help="Picture of what a machine draws that sees only the simulated board's pins.",
+)
+@click.option("--json", "summary_file", metavar="FILE|-", help="The summary, as JSON.")
+def send_command(
+    port: str,
+    file: str,
+    width: int,
+    kinds: tuple[str, ...],
+    baud: int | None,
+    clear: bool,
+    plotter: str | None,
+    summary_file: str | None,
+    **given: Any,
+) -> None:
+    """Send a path to a board at a serial port, and wait until it is drawn.
+
+    FILE is G-code, which needs --steps-per-mm and --clock, or a CSV file of support points, which
+    needs --feed: as for `discreta simulate path`. The machine is said to stand at its start.
+
+    PORT is a serial port like /dev/ttyUSB0, or sim: for the simulated board: the RTL of the whole
+    controller, compiled, behind a pseudo-terminal, with a machine at its pins that sees nothing
+    else. Ctrl-C stops the machine down its ramp and tells where it stands. Exits 1 when the machine
+    has stopped before the end, the board does not answer, or the simulated machine was not just
+    where the golden models are.
+
+    \b
+    Example: discreta send sim: examples/bulgaria.csv --feed 1/4 \\
+                 --damage 0.01 --lose 0.01 --plotter sent.png
+    """
+    from discreta.boards.host import LinkError
+    from discreta.send import SIMULATED, Simulation, send
+
+    simulated = {name: given.pop(name) for name in ("clocks_per_bit", "damage", "lose", "seed")}
+    simulated = {name: value for name, value in simulated.items() if value is not None}
+    for name in (*simulated, *(["plotter"] if plotter else [])):
+        if port != SIMULATED:
+            raise BadInputError(
+                f"--{name.replace('_', '-')} is for the simulated board: give {SIMULATED} for the "
+                "port, or leave it out"
+            )
+    if baud is not None and port == SIMULATED:
+        raise BadInputError(f"--baud is for a port, and {SIMULATED} is none: leave it out")
+    kind = picture_format("--plotter", plotter)
+    job = _job(file, width, kinds, given)
+    if port == SIMULATED:
+        _needs_compiler()
+    try:
+        with Outputs((file,)) as outputs:
+            json_file = outputs.open(summary_file) if summary_file is not None else None
+            picture = outputs.place(plotter) if plotter is not None else None
+            with _progress("blocks", quiet=False) as show:
+                began = time.perf_counter()
+                good = True
+                if port == SIMULATED:
+                    board = Simulation(job, **simulated)
+                    try:
+                        summary = send(job, board.name, clear=clear, progress=show)
+                    finally:
+                        board.close()
+                    summary |= board.facts(summary)
+                    good = board.good
+                    if picture is not None:
+                        board.pen.draw(picture, kind, f"sent, {width} bits")
+                else:
+                    speed = {} if baud is None else {"baud": baud}
+                    summary = send(job, port, clear=clear, progress=show, **speed)
+            if json_file:
+                json.dump(summary, json_file, indent=2)
+                json_file.write("\n")
+    except LinkError as error:
+        _complain(str(error))
+        raise click.exceptions.Exit(1) from None
+    _print_summary(summary, time.perf_counter() - began, err=summary_file == "-")
+    if not good or "stopped" in summary:
+        raise click.exceptions.Exit(1)
+
+
+#: nextpnr takes seeds of 32 bits, and calls every one of less than 1 the same.
+_MAX_SEED = 2**31 - 1
+
+
+def _check_placement_seed(seed: int) -> None:
+    if not 1 <= seed <= _MAX_SEED:
+        raise ValueError(f"seed is {seed}: choose a whole number from 1 to {_MAX_SEED}")
+
+
+class _BoardName(click.ParamType):
+    """The name of a board."""
+
+    name = "BOARD"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Board:
+        if value not in BOARDS:
+            self.fail(f"there is no board {value!r}: choose {' or '.join(BOARDS)}", param, ctx)
+        return BOARDS[value]
+
+
+@cli.command("boards", short_help="The boards there are, and their pins.")
+@click.argument("board", type=_BoardName(), required=False)
+def boards_command(board: Board | None) -> None:
+    """List the boards there are; with BOARD: what each of its pins is for.
+
+    Example: discreta boards icebreaker
+    """
+    out = _out()
+    if board is None:
+        table = _table(("board", "is", "draws", "clock"), 3)
+        for each in BOARDS.values():
+            table.add_row(each.name, each.title, each.draws, f"{each.clock / 1e6:g} MHz")
+        out.print(table)
+        return
+    out.print(f"{board.title}, serial link at {board.baud} baud")
+    table = _table(("port", "is", "on the board", "pin of the FPGA", "", "volts"), 5)
+    for pin in board.pins:
+        table.add_row(*pin.row())
+    out.print(table)
+
+
+@cli.command("build", short_help="Make the bits of a board, checked against its clock.")
+@click.argument("board", type=_BoardName())
+@click.option(
+    "--output",
+    metavar="FILE|FOLDER",
+    help="The bits, or the folder of a project.  [default: named after the board]",
+)
+@click.option(
+    "--seed",
+    type=_Number("seed", 1, _MAX_SEED, _check_placement_seed),
+    help="That of the placement.  [default: the first of 1 to 5 that reaches the clock]",
+)
+@click.option(
+    "--normally-closed",
+    is_flag=True,
+    help="Limit and stop switches open when they act; else they close to ground.",
+)
+@click.option("--json", "json_file", metavar="FILE|-", help="What is printed, as JSON.")
+def build_command(
+    board: Board,
+    output: str | None,
+    seed: int | None,
+    normally_closed: bool,
+    json_file: str | None,
+) -> None:
+    """Make the bits of a board: the device, its serial link, and the board's pins.
+
+    Prints the cells that it takes, and how much faster than the board's clock it could run. Exits 1
+    when it does not fit or does not reach that clock. The same seed gives the same bits on every
+    machine. For arty-a7, which needs Vivado, it writes a project and builds nothing.
+
+    Example: discreta build icebreaker
+    """
+    if board.fpga not in FPGAS:
+        if seed is not None or json_file is not None:
+            raise BadInputError(f"{board.name} is not built here: leave out --seed and --json")
+        _write_project(board, output or board.name, normally_closed)
+        return
+    fpga = FPGAS[board.fpga]
+    path = output or f"{board.name}.{fpga.tools.bits}"
+    done = 0
+
+    def progress() -> None:
+        nonlocal done
+        done += 1
+        show(done, max(done, BUILD_RUNS))
+
+    with Outputs() as outputs, _progress("runs", quiet=json_file == "-") as show:
+        place = outputs.place(path)
+        file = None if json_file is None else outputs.open(json_file)
+        show(0, BUILD_RUNS)
+        try:
+            check_tools(board.fpga, packs=True)
+            top = Top(board, normally_closed=normally_closed)
+            made = build(
+                top,
+                top.ports.values(),
+                board.fpga,
+                constraints(board, fpga.tools.constraints),
+                board.clock / 1e6,
+                BUILD_SEEDS if seed is None else (seed,),
+                progress=progress,
+            )
+        except ModuleNotFoundError as error:
+            raise BadInputError(
+                f"a build needs {error.name}: install the extra, pip install 'discreta[boards]'"
+            ) from None
+        except SynthesisError as error:
+            raise SynthesisError(f"{board.name}: {error}") from None
+        place.write_bytes(made.bits)
+        summary = {
+            "board": board.name,
+            "draws": board.draws,
+            "seed": made.seed,
+            "clock": made.clock,
+            "fastest": made.fmax,
+            "margin": made.margin,
+            "used": made.used,
+            "available": made.available,
+            "bytes": len(made.bits),
+            "sha256": sha256(made.bits).hexdigest(),
+        }
+        if file is not None:
+            json.dump(summary, file, indent=2)
+            file.write("\n")
+    _print_build(board, path, made, summary["sha256"], err=json_file == "-")
+
+
+def _print_build(board: Board, path: str, made: Bitstream, digest: str, *, err: bool) -> None:
+    """Print what bits take of their board."""
+    out = _out(err=err)
+    out.print(f"{board.title}: {board.draws}")
+    table = _table(("", "used", "there", "%"))
+    for what, used in made.used.items():
+        there = made.available[what]
+        share = f"{100 * used / there:.0f}" if there else "-"
+        table.add_row(what, str(used), str(there), share)
+    out.print(table)
+    out.print(
+        f"clock {made.clock:g} MHz, {made.fmax:.2f} reached: margin {made.margin:.0f} %, "
+        f"seed {made.seed}"
+    )
+    out.print(f"{path}: {len(made.bits)} bytes, sha256 {digest}")
+    out.print(f"load it: {board.load.format(path)}")
+
+
+def _write_project(board: Board, folder: str, normally_closed: bool) -> None:
+    """Write a project for a board that is not built here."""
+    texts = project(board, Top(board, normally_closed=normally_closed))
+    fresh = not os.path.lexists(folder)
+    Path(folder).mkdir(exist_ok=True)
+    try:
+        with Outputs() as outputs:
+            for name, text in texts.items():
+                outputs.open(str(Path(folder, name))).write(text)
+    except BaseException:
+        if fresh:
+            Path(folder).rmdir()
+        raise
+    click.echo(
+        f"{board.title} is not built here: {folder} has a project for Vivado, "
+        "vivado -mode batch -source build.tcl"
+    )
 
 
 @cli.command("methods")

@@ -17,6 +17,7 @@ from schemdraw.elements import Element
 from schemdraw.logic import TimingDiagram
 from schemdraw.segments import Segment, SegmentCircle, SegmentPoly, SegmentText
 
+from discreta.boards.catalogue import BOARDS
 from discreta.hdl.circular import Circular
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import Part
@@ -29,6 +30,7 @@ __all__ = [
     "Lane",
     "Sheet",
     "Timing",
+    "board_wiring",
     "circular_blocks",
     "circular_turn",
     "conic_blocks",
@@ -508,6 +510,70 @@ def conic_blocks() -> Iterable[Element]:
     return [s]
 
 
+def board_wiring() -> Iterable[Element]:
+    """Yield the wires from an iCEBreaker to drivers, motors and switches."""
+    board = BOARDS["icebreaker"]
+    labels = {pin.port: pin.label for pin in board.pins}
+    sheet = Sheet(-2.6, -0.7, 17.4, 12.3)
+    edge, bus = 6.6, 10.4
+
+    def line(*path: XY) -> None:
+        sheet.segments.append(Segment(list(path), color=INK, lw=LINE, zorder=2))
+
+    def pin(y: float, label: str, port: str = "") -> None:
+        sheet.words((edge - 0.15, y), label, "right")
+        sheet.words((edge + 0.15, y + 0.22), port)
+
+    sheet.box(2.4, -0.3, edge, 11.7, fill=LOGIC_FILL, name=board.name, middle=3.5)
+    sheet.box(-2.3, 8.6, 0.2, 10.2, fill=REGISTER_FILL, name="computer")
+    line((0.2, 9.4), (2.4, 9.4))
+    sheet.words((1.3, 9.65), "USB", "center")
+    for axis, top in (("x", 10.8), ("y", 6.8)):
+        sheet.box(bus, top - 2.6, 13.0, top + 0.5, fill=REGISTER_FILL, name="")
+        sheet.words((11.7, top + 0.8), f"driver {axis}", "center", size=NAME_SIZE)
+        sheet.box(14.6, top - 1.4, 17.0, top + 0.4, fill=REGISTER_FILL, name=f"motor {axis}")
+        wires = (
+            (labels[f"step_{axis}"], f"step_{axis}", "STEP"),
+            (labels[f"direction_{axis}"], f"direction_{axis}", "DIR"),
+            ("3V3", "", "VDD"),
+            ("GND", "", "GND, EN"),
+        )
+        for row, (label, port, name) in enumerate(wires):
+            y = top - 0.6 * row
+            pin(y, label, port)
+            sheet.words((bus + 0.15, y), name)
+            if port:
+                sheet.wire((edge, y), (bus, y))
+            else:
+                line((edge, y), (bus, y))
+        supplied = top - 2.3
+        line((13.6, 2.0), (13.6, supplied), (13.0, supplied))
+        sheet.words((12.85, supplied), "VMOT, GND", "right")
+        for row, name in enumerate(("1A", "1B", "2A", "2B")):
+            y = top - 0.35 * row
+            # The supply's wire goes over those of the motor that is nearer to it.
+            line((13.0, y), (13.45 if axis == "y" else 14.6, y))
+            line((13.75, y), (14.6, y))
+            sheet.words((12.85, y), name, "right")
+    sheet.dot((13.6, 4.5))
+    sheet.box(
+        *(12.4, 0.4, 17.0, 2.0),
+        fill=CONTROL_FILL,
+        name="motor supply",
+        words="cut by a stop button",
+    )
+    for row, port in enumerate(("low_x", "high_x", "low_y", "high_y", "stop")):
+        y = 3.0 - 0.6 * row
+        pin(y, labels[port], port)
+        line((edge, y), (8.6, y))
+        line((8.6, y), (9.2, y + 0.28))
+        line((9.2, y), (bus - 0.6, y))
+        sheet.dot((bus - 0.6, y))
+    line((bus - 0.6, 3.0), (bus - 0.6, 0.0), (edge, 0.0))
+    pin(0.0, "GND")
+    yield sheet
+
+
 def with_minus(value: object) -> str:
     """Write numbers with a minus sign, not a hyphen."""
     return str(value).replace("-", "−")
@@ -794,6 +860,7 @@ FIGURES: dict[str, Callable[[], Iterable[Element]]] = {
     "circular-turn": lambda: circular_turn().draw(),
     "conic-blocks": conic_blocks,
     "conic-turn": lambda: conic_turn().draw(),
+    "board-wiring": board_wiring,
 }
 
 

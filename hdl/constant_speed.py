@@ -24,6 +24,7 @@ __all__ = [
     "ConstantSpeed",
     "constant_arc",
     "constant_line",
+    "constant_speed_layout",
     "pace_bits",
     "ticks_bits",
 ]
@@ -40,6 +41,15 @@ def pace_bits(width: int) -> int:
 def ticks_bits(width: int) -> int:
     """Give the bits of the field ``ticks``: a circle's length, as often as it may be run round."""
     return width + 3 + FULL_TURNS_BITS
+
+
+def constant_speed_layout(core: data.StructLayout, width: int, axes: int) -> data.StructLayout:
+    """Lay out the blocks of a core that are run at constant speed; ``core`` has its own."""
+    point = point_layout(width, axes)
+    fields: dict[str, Any] = dict(core.members)
+    further = axes > len(fields["start"].members)
+    fields |= {"start": point, "end": point, "pace": pace_bits(width)}
+    return data.StructLayout(fields | ({"ticks": ticks_bits(width)} if further else {}))
 
 
 class ConstantSpeed(Part):
@@ -126,13 +136,10 @@ class ConstantSpeed(Part):
             raise ValueError(f"number of axes is {axes}: a line's are its core's, {core.axes}")
         width = core.width
         point = point_layout(width, axes)
-        fields: dict[str, Any] = dict(core.blocks.payload.shape().members)
-        fields |= {"start": point, "end": point, "pace": pace_bits(width)}
-        if axes > core.axes:
-            fields["ticks"] = ticks_bits(width)
+        layout = constant_speed_layout(core.blocks.payload.shape(), width, axes)
         super().__init__(
             {
-                "blocks": In(stream.Signature(data.StructLayout(fields))),
+                "blocks": In(stream.Signature(layout)),
                 "steps": Out(stream.Signature(step_layout(axes))),
                 "position": Out(point),
                 "busy": Out(1),
@@ -141,7 +148,6 @@ class ConstantSpeed(Part):
             }
         )
         self.core = core
-        self.restart = core.restart
         self.width = width
         self.axes = axes
         self.letters = AXIS_LETTERS[:axes]

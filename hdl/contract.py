@@ -27,6 +27,7 @@ __all__ = [
     "check_choice",
     "check_flag",
     "check_guard",
+    "check_number",
     "check_width",
     "per_axis",
     "point_layout",
@@ -65,9 +66,6 @@ class Part(wiring.Component):
     intermediates : dict of str to Signal
         Signals between the registers, by names that the golden model has for them too: a proof of
         equality goes over them. Empty where it needs none.
-    restart : Signal or None
-        Must be 1 whenever a ``ResetInserter`` around the part resets it, because registers are
-        reset by hand in it; None where the inserter alone does.
     """
 
     notation: ClassVar[str] = ""
@@ -75,7 +73,6 @@ class Part(wiring.Component):
     def __init__(self, signature: Any):
         super().__init__(signature)
         self.intermediates: dict[str, Signal] = {}
-        self.restart: Signal | None = None
 
     if TYPE_CHECKING:
         # The members are made from the signature when the part is made.
@@ -125,7 +122,8 @@ def step_layout(axes: int) -> data.StructLayout:
     )
 
 
-def _check_int(what: str, value: int, low: int, high: int) -> None:
+def check_number(what: str, value: int, low: int, high: int) -> None:
+    """Raise ``TypeError`` or ``ValueError`` unless ``value`` is a whole number in these limits."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise TypeError(f"{what} must be a whole number from {low} to {high}, not {value!r}")
     if not low <= value <= high:
@@ -137,17 +135,17 @@ def check_width(width: int, most: int = MAX_WIDTH) -> None:
 
     That is 32, if a method has no limit of its own.
     """
-    _check_int("width", width, MIN_WIDTH, most)
+    check_number("width", width, MIN_WIDTH, most)
 
 
 def check_axes(axes: int) -> None:
     """Raise ``TypeError`` or ``ValueError`` unless ``axes`` is a whole number from 2 to 6."""
-    _check_int("number of axes", axes, MIN_AXES, MAX_AXES)
+    check_number("number of axes", axes, MIN_AXES, MAX_AXES)
 
 
 def check_guard(guard: int) -> None:
     """Raise ``TypeError`` or ``ValueError`` unless ``guard`` is a whole number from 0 to 4."""
-    _check_int("number of guard bits", guard, 0, MAX_GUARD)
+    check_number("number of guard bits", guard, 0, MAX_GUARD)
 
 
 def check_flag(what: str, value: bool) -> None:

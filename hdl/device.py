@@ -7,17 +7,25 @@ from typing import Any
 
 from amaranth import Module, ResetInserter, Signal
 from amaranth.hdl import Value
-from amaranth.lib import stream
+from amaranth.lib import data, stream
 from amaranth.lib.wiring import In, Out
 
-from discreta.hdl.constant_speed import ConstantSpeed, constant_arc, constant_line
-from discreta.hdl.contract import Part, per_axis, point_layout
+from discreta.hdl.arc_input import arc_block_layout
+from discreta.hdl.conic import conic_block_layout
+from discreta.hdl.constant_speed import (
+    ConstantSpeed,
+    constant_arc,
+    constant_line,
+    constant_speed_layout,
+)
+from discreta.hdl.contract import Part, check_axes, check_width, per_axis, point_layout
 from discreta.hdl.exact_conic import ExactConic
 from discreta.hdl.feed import ACCELERATION_BITS, OVERRIDE_BITS, FeedUnit
 from discreta.hdl.pulse import TIMING_BITS, PulseUnit
-from discreta.hdl.queue import KINDS, BlockQueue, StopReason
+from discreta.hdl.quadrant import line_block_layout
+from discreta.hdl.queue import KINDS, BlockQueue, StopReason, device_block_layout
 
-__all__ = ["Device", "exact_device"]
+__all__ = ["Device", "exact_device", "exact_layout"]
 
 _TIMINGS = ("pulse_length", "pulse_space", "direction_setup", "direction_hold")
 
@@ -74,7 +82,7 @@ class Device(Part):
         The interpolators, of the same width and number of axes, without a carrier; at least one.
     depth : int
         Blocks that the queue holds, 1 to 4096.
-    pauses, pairing
+    pauses, pairing, multiplier
         Of the feed unit.
     pins : str
         ``"step_direction"`` or ``"quadrature"``.
@@ -110,6 +118,7 @@ class Device(Part):
         depth: int = 16,
         pauses: Sequence[int] | None = None,
         pairing: bool = True,
+        multiplier: bool = False,
         pins: str = "step_direction",
         inverted_steps: str = "",
         inverted_directions: str = "",
@@ -119,12 +128,13 @@ class Device(Part):
         width, axes = _shared(self.interpolators)
         self.width = width
         self.axes = axes
+        self.depth = depth
         layouts = {kind: part.blocks.payload.shape() for kind, part in self.interpolators.items()}
         steady = [
             kind for kind, part in self.interpolators.items() if isinstance(part, ConstantSpeed)
         ]
         self.queue = BlockQueue(width, axes, layouts, depth, steady=steady)
-        self.feed = FeedUnit(axes, pauses=pauses, pairing=pairing)
+        self.feed = FeedUnit(axes, pauses=pauses, pairing=pairing, multiplier=multiplier)
         self.pulse = PulseUnit(
             width,
             axes,
@@ -160,6 +170,7 @@ class Device(Part):
             "depth": depth,
             "pauses": self.feed.pauses,
             "pairing": pairing,
+            "multiplier": multiplier,
             "pins": pins,
             "inverted_steps": inverted_steps,
             "inverted_directions": inverted_directions,
@@ -196,8 +207,6 @@ class Device(Part):
         m.submodules.pulse = pulse
         for kind, part in self.interpolators.items():
             m.submodules[kind] = ResetInserter(stands)(part)
-            if part.restart is not None:
-                m.d.comb += part.restart.eq(stands)
             offered, steps = getattr(queue, f"{kind}_blocks"), getattr(queue, f"{kind}_steps")
             m.d.comb += [
                 part.blocks.payload.eq(offered.payload),
@@ -286,19 +295,38 @@ def exact_device(
     TypeError, ValueError
         A parameter is not one of the above.
     """
-    unknown = [kind for kind in kinds if kind not in KINDS]
-    if unknown or not kinds:
-        raise ValueError(f"kinds are {tuple(kinds)!r}: choose one or more of {', '.join(KINDS)}")
+    _check_kinds(kinds, axes)
     parts: dict[str, Part] = {}
     if "line" in kinds:
         parts["line"] = constant_line(width, axes)
     if "arc" in kinds:
         parts["arc"] = constant_arc(width, axes)
     if "conic" in kinds:
-        if axes != 2:
-            raise ValueError(f"number of axes is {axes!r}: conics lie in a plane, choose 2")
         parts["conic"] = ExactConic(width)
     return Device(**parts, **choices)
+
+
+def exact_layout(
+    width: int = 16, axes: int = 2, kinds: Sequence[str] = ("line", "arc")
+) -> data.StructLayout:
+    """Lay out the blocks of :func:`exact_device` for whoever sends them and has none."""
+    check_width(width)
+    check_axes(axes)
+    _check_kinds(kinds, axes)
+    cores = {
+        "line": constant_speed_layout(line_block_layout(width, axes), width, axes),
+        "arc": constant_speed_layout(arc_block_layout(width), width, axes),
+        "conic": conic_block_layout(width),
+    }
+    return device_block_layout(width, axes, {kind: cores[kind] for kind in KINDS if kind in kinds})
+
+
+def _check_kinds(kinds: Sequence[str], axes: int) -> None:
+    """Raise ``ValueError`` unless there are exact interpolators of all these kinds."""
+    if not kinds or not set(kinds) <= set(KINDS):
+        raise ValueError(f"kinds are {tuple(kinds)!r}: choose one or more of {', '.join(KINDS)}")
+    if "conic" in kinds and axes != 2:
+        raise ValueError(f"number of axes is {axes!r}: conics lie in a plane, choose 2")
 
 
 def _shared(interpolators: dict[str, Part]) -> tuple[int, int]:

@@ -1,6 +1,6 @@
 """The exact arc interpolator: the sign of the circle's own residual chooses every step."""
 
-from amaranth import Cat, Const, Module, Mux, ResetSignal, Signal, Value
+from amaranth import Cat, Const, Module, Mux, Signal, Value
 from amaranth.hdl import signed, unsigned
 from amaranth.lib import stream
 from amaranth.lib.wiring import In, Out
@@ -376,9 +376,9 @@ class ExactArc(Part):
         self.input = ExactArcInput(width)
 
         way_shape, end_shape = signed(width + 2), signed(width + 1)
-        self.f = Signal(signed(width + 3), reset_less=True)
-        self.axial = Signal(way_shape, init=1, reset_less=True)
-        self.diagonal = Signal(way_shape, reset_less=True)
+        self.f = Signal(signed(width + 3))
+        self.axial = Signal(way_shape, init=1)
+        self.diagonal = Signal(way_shape)
         self.mode = Signal(2)
         self.second = Signal()
         self.to_second = Signal()
@@ -402,12 +402,11 @@ class ExactArc(Part):
         self.pulse = {a: Signal(name=f"pulse_{a}") for a in "xy"}
         self.direction = {a: Signal(name=f"direction_{a}") for a in "xy"}
         self.last = Signal()
-        self.load_f = Signal(signed(width + 3), reset_less=True)
-        self.load_axial = Signal(way_shape, reset_less=True)
-        self.load_diagonal = Signal(way_shape, reset_less=True)
+        self.load_f = Signal(signed(width + 3))
+        self.load_axial = Signal(way_shape)
+        self.load_diagonal = Signal(way_shape)
         self.load_past = {a: Signal(way_shape, name=f"load_past_{a}") for a in "xy"}
         self.load_end = {a: Signal(end_shape, name=f"load_end_{a}") for a in "xy"}
-        self.restart = Signal()
         #: 1 in the clock in which the next step is decided and nothing keeps it.
         self.entering = Signal()
 
@@ -453,8 +452,6 @@ class ExactArc(Part):
             Signal(name=name) for name in ("goes_on", "frozen", "turn", "leads")
         )
         to_second = self.to_second
-        # What is set to a constant, too, is reset with that: it spares gates.
-        rst = ResetSignal() | self.restart
         moves = self.loading | (self.running & ~frozen)
         prepares, changes = self.mode[1], self.mode == CHANGE
         # The sign of E is kept the other way round while X leads.
@@ -500,8 +497,11 @@ class ExactArc(Part):
             half.eq(_sum(self.f[1:], Cat(addend[:-1], addend[-1] ^ changes), carry)),
         ]
         low = Mux(self.loading, self.load_f[0], self.f[0] ^ Mux(to_second, slanted ^ self.odd, 1))
-        with m.If(rst | (free & moves & (ends | ~prepares))):
-            m.d.sync += self.f.eq(Mux(rst | ends, 0, Cat(low, half)))
+        # What is set to what reset sets it to comes first: it spares gates.
+        with m.If(free & moves & ends):
+            m.d.sync += self.f.eq(0)
+        with m.Elif(free & moves & ~prepares):
+            m.d.sync += self.f.eq(Cat(low, half))
 
         # What it grows by. Each takes over the other, or its complement, where the octant changes.
         new_axial, new_diagonal = Signal(signed(n + 2)), Signal(signed(n + 2))
@@ -547,11 +547,10 @@ class ExactArc(Part):
                 )
             ),
         ]
-        with m.If(rst | (free & moves)):
-            with m.If(rst | ends):
-                m.d.sync += [self.axial.eq(1), self.diagonal.eq(0)]
-            with m.Else():
-                m.d.sync += [self.axial.eq(new_axial), self.diagonal.eq(new_diagonal)]
+        with m.If(free & moves & ends):
+            m.d.sync += [self.axial.eq(1), self.diagonal.eq(0)]
+        with m.Elif(free & moves):
+            m.d.sync += [self.axial.eq(new_axial), self.diagonal.eq(new_diagonal)]
 
         # Where the octant changes next, from what the registers come to.
         next_second, next_final = Signal(), Signal()
@@ -609,9 +608,10 @@ class ExactArc(Part):
             (self.load_axial, inp.axial),
             (self.load_diagonal, inp.diagonal),
         ]
-        with m.If(rst | free):
-            for register, value in loads:
-                m.d.sync += register.eq(Mux(rst | ~begin, 0, value))
+        with m.If(free & ~begin):
+            m.d.sync += [register.eq(0) for register, _ in loads]
+        with m.Elif(free):
+            m.d.sync += [register.eq(value) for register, value in loads]
         with m.If(free):
             m.d.sync += [
                 self.loading.eq(begin),

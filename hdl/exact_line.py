@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from amaranth import Cat, Const, Module, Mux, Signal, Value
+from amaranth import Cat, Module, Mux, Signal, Value
 from amaranth.hdl import signed
 from amaranth.lib import stream
 from amaranth.lib.wiring import In, Out
@@ -42,16 +42,23 @@ class ExactLine(Part):
     Preparation: a block is taken in with its ways Δ, weighed (in the plane the signs of ΔX + ΔY and
     ΔX − ΔY tell who leads; with more axes the ways are compared one a clock), in the plane chosen
     (leader and follower), prepared (addends, first residual) and loaded, each in a clock. A stage
-    takes a block over when the one before has it and it is empty itself.
+    takes a block over when the one before has it and it is empty itself. A step is decided in one
+    clock and waits from the next one on.
 
-    Registers: P3, P4 = position; P5 = steps left of the leading axis, less 3; with more than two
-    axes XT… and KO. ``gain`` = Δ and ``loss`` = Δ ∓ L of the follower, ``addend``, ``total``,
-    ``often`` (the decision that comes more often: 1 moves), ``first`` (the sign of the first E),
-    ``rare`` (the step now waiting is of the other kind). In the plane there is one follower; with
-    more axes every axis is one, also the one that leads, and the names end in its letter.
+    On an iCE40 a carry leaves one input of its LUT free. So what an accumulator is loaded with
+    comes to it where its sum is known (``total`` and ``addend`` are 0 then, P5 is 1), or from the
+    register that is added otherwise (``move``): no multiplexer stands behind a carry chain.
 
-    Latency: the first step of a block that is accepted in clock 0 waits from clock 7 on, with a > 2
-    axes from clock a + 5 on, if nothing is before it. ``done`` follows the last step by a clock.
+    Registers: P3, P4 = position, ``move`` = what is added to them next, or their new value; P5 =
+    the steps decided less L, and 1 more: it counts up to 0, the last step, and rests at 1; with
+    more than two axes XT… and KO. ``gain`` = Δ and ``loss`` = Δ ∓ L of the follower, ``addend``,
+    ``total``, ``rest`` (the first E, once), ``often`` (the decision that comes more often: 1
+    moves), ``first`` (the sign of the first E), ``rare`` (the step decided last is of the other
+    kind, or none has been). In the plane there is one follower; with more axes every axis is one,
+    also the one that leads, and the names end in its letter.
+
+    Latency: the first step of a block that is accepted in clock 0 waits from clock 8 on, with a > 2
+    axes from clock a + 6 on, if nothing is before it. ``done`` follows the last step by a clock.
 
     Throughput: a step a clock, and one clock between the last step of a block and the first one of
     the next, however short they are (with a > 2 axes blocks come every a + 2 clocks at best). A
@@ -61,7 +68,7 @@ class ExactLine(Part):
     ``position`` shows the steps taken, not the one that waits; it is loaded with the block's start
     in the clock before its first step waits.
 
-    Reset: everything 0, nothing pending, position at the origin.
+    Reset: everything 0 but P5, nothing pending, position at the origin.
 
     Overflow: ``error`` is ``RANGE`` for one clock, in place of ``done``, for a block with an axis
     longer than 2^n − 1 steps; nothing moves and the next block runs as ever. E and what it grows by
@@ -129,18 +136,25 @@ class ExactLine(Part):
         }
         starts = {f"ready_start_{a}": wide for a in self.letters}
         negatives = {f"ready_negative_{a}": 1 for a in self.letters}
+        moves = {f"move_{a}": wide for a in self.letters}
         begin = {f"begin_{a}": wide for a in self.letters}
         begin |= {f"negative_{a}": 1 for a in self.letters}
         groups: dict[str, dict[str, Any]] = {
-            "position": dict.fromkeys(places, wide),
+            "position": dict.fromkeys(places, wide) | moves,
             "residual of the follower": {
                 f"{name}{f}": 1 if name in ("often", "first", "rare") else wide
                 for f in self.followers
-                for name in ("gain", "loss", "total", "addend", "often", "first", "rare")
+                for name in ("gain", "loss", "total", "addend", "rest", "often", "first", "rare")
             },
-            "steps left": {left: wide, "one": 1},
+            "steps left": {left: wide},
             "block loaded": begin,
-            "УУ": dict.fromkeys(("idle", "loaded", "starting", "running", "done", "error"), 1),
+            "УУ": dict.fromkeys(("works", "loaded", "starting", "running", "done", "error"), 1),
+            "step decided": {
+                "decided": 1,
+                "final": 1,
+                **{f"moves_{a}": 1 for a in self.letters},
+                **{f"falls_{a}": 1 for a in self.letters},
+            },
             "step that waits": {
                 "waiting": 1,
                 "last": 1,
@@ -150,6 +164,7 @@ class ExactLine(Part):
             },
             "block accepted": {"open": 1, "pending": 1, "weighed": 1, **ways},
             "block prepared": {
+                "room": 1,
                 "prepared": 1,
                 "refused": 1,
                 "ready_fault": 1,
@@ -164,13 +179,20 @@ class ExactLine(Part):
             },
         }
         if plane:
+            groups["steps left"]["more"] = 1
             groups["step that waits"]["follows_x"] = 1
             groups["block loaded"]["follow_x"] = 1
-            groups["block accepted"] |= {"sum_down": 1, "difference_down": 1}
+            groups["block accepted"] |= {
+                "sum_down": 1,
+                "difference_down": 1,
+                "bare_x": 1,
+                "bare_y": 1,
+            }
             groups["block prepared"]["ready_follow_x"] = 1
             groups["leader chosen"] = {
                 "chosen": 1,
                 "way_fault": 1,
+                "way_bare": 1,
                 "way_follow": wide,
                 "way_lead": wide,
                 "way_follow_x": 1,
@@ -182,7 +204,7 @@ class ExactLine(Part):
             groups["block accepted"] |= {"axis": 3, "reach": width + 1}
         made = {
             title: {
-                name: Signal(shape, name=name, init=name in ("open", "idle", "one"))
+                name: Signal(shape, name=name, init=name in ("open", "room", left))
                 for name, shape in group.items()
             }
             for title, group in groups.items()
@@ -194,23 +216,30 @@ class ExactLine(Part):
             register.name: register for group in self.diagram.values() for register in group
         }
         self.left = self.registers[left]
+        #: The block prepared is loaded in this clock, or the one refused is answered.
+        self.given, self.answer = Signal(), Signal()
+        # Kept as it is, so that each of its bits is the fourth input of a LUT behind a carry.
+        self.loaded_count = Signal(width + 1, attrs={"keep": 1})
         self.place = {a: self.registers[name] for a, name in zip(self.letters, places, strict=True)}
 
     def elaborate(self, platform):
         """Describe the hardware."""
         m = Module()
         r = self.registers
-        go, taken, ends, load, answer, room, leaves = (
-            Signal(name=name)
-            for name in ("go", "taken", "ends", "load", "answer", "room", "leaves")
+        go, taken, rests, ends, load, leaves = (
+            Signal(name=name) for name in ("go", "taken", "rests", "ends", "load", "leaves")
         )
+        room = r["room"]
+        answer = self.answer
         m.d.comb += [
             go.eq(~r["waiting"] | self.steps.ready),
             taken.eq(r["waiting"] & self.steps.ready),
-            ends.eq(r["running"] & self.left[-1]),
-            load.eq(r["prepared"] & (r["idle"] | ends)),
-            answer.eq(r["refused"] & r["idle"] & ~r["waiting"]),
-            room.eq(~r["prepared"] & ~r["refused"]),
+            # With the last step, and where no block runs.
+            rests.eq(~self.left[-1]),
+            ends.eq(r["running"] & rests),
+            load.eq(r["prepared"] & rests),
+            answer.eq(r["refused"] & ~r["works"] & ~r["decided"] & ~r["waiting"]),
+            self.given.eq(go & load),
             self.steps.valid.eq(r["waiting"]),
             self.steps.payload.last.eq(r["last"]),
             self.done.eq(r["done"]),
@@ -220,19 +249,19 @@ class ExactLine(Part):
             r["done"].eq((taken & r["last"]) | (answer & ~r["ready_fault"])),
             r["error"].eq(answer & r["ready_fault"]),
         ]
-        with m.If(answer):
-            m.d.sync += r["refused"].eq(0)
         with m.If(go):
             m.d.sync += [
-                r["idle"].eq(~(load | r["loaded"] | (r["running"] & ~ends))),
+                r["works"].eq(load | r["loaded"] | (r["running"] & ~ends)),
                 r["loaded"].eq(load),
                 r["starting"].eq(r["loaded"]),
                 r["running"].eq(r["loaded"] | (r["running"] & ~ends)),
-                r["waiting"].eq(r["running"]),
-                r["last"].eq(ends),
+                r["decided"].eq(r["running"]),
+                r["final"].eq(ends),
+                r["waiting"].eq(r["decided"]),
+                r["last"].eq(r["final"]),
             ]
-            with m.If(load):
-                m.d.sync += r["prepared"].eq(0)
+            # What is not loaded, as no block is prepared, is not looked at.
+            with m.If(rests):
                 for a in self.letters:
                     m.d.sync += [
                         r[f"begin_{a}"].eq(r[f"ready_start_{a}"]),
@@ -244,13 +273,13 @@ class ExactLine(Part):
         if self.axes == 2:
             m.d.comb += leaves.eq(r["weighed"] & ~r["chosen"])
             self._choose(m, leaves, room)
-            self._prepare_plane(m, r["chosen"] & room)
+            self._prepare_plane(m, r["chosen"] & room, room)
         else:
             m.d.comb += leaves.eq(r["weighed"] & room)
             self._weigh(m, leaves)
-            self._prepare_space(m, leaves)
+            self._prepare_space(m, leaves, room)
         self._count(m, go, load)
-        moves = {f: self._follow(m, f, go, load) for f in self.followers}
+        moves = {f: self._follow(m, f, go, rests) for f in self.followers}
         if self.axes == 2:
             follows_x = r["follows_x"]
             moved = {"x": moves[""] | ~follows_x, "y": moves[""] | follows_x}
@@ -260,29 +289,36 @@ class ExactLine(Part):
             moved = {a: moves[f"_{a}"] for a in self.letters}
         for a in self.letters:
             place, pulse, direction = self.place[a], r[f"pulse_{a}"], r[f"direction_{a}"]
-            down = r[f"down_{a}"]
+            down, move = r[f"down_{a}"], r[f"move_{a}"]
+            next_pulse, next_down = Signal(name=f"next_pulse_{a}"), Signal(name=f"next_down_{a}")
             m.d.comb += [
+                next_pulse.eq(r["running"] & moved[a]),
+                next_down.eq(next_pulse & direction),
                 self.position[a].eq(place),
                 self.steps.payload[a].eq(Cat(pulse, down).as_signed()),
             ]
             with m.If(go):
                 m.d.sync += [
-                    # What waits is taken now; where nothing does, nothing is added.
-                    place.eq(
+                    # What waits is taken now; where nothing does, nothing is added. What is added
+                    # and what is loaded come from one register: a LUT behind each carry does both.
+                    place.eq(Mux(r["starting"], move, place + move)),
+                    move.eq(
                         Mux(
                             r["loaded"],
                             r[f"begin_{a}"],
-                            place + Cat(pulse, down.replicate(self.width)).as_signed(),
+                            Cat(r[f"moves_{a}"], r[f"falls_{a}"].replicate(self.width)).as_signed(),
                         )
                     ),
-                    pulse.eq(r["running"] & moved[a]),
-                    down.eq(r["running"] & moved[a] & direction),
+                    pulse.eq(r[f"moves_{a}"]),
+                    down.eq(r[f"falls_{a}"]),
+                    r[f"moves_{a}"].eq(next_pulse),
+                    r[f"falls_{a}"].eq(next_down),
                 ]
                 with m.If(r["loaded"]):
                     m.d.sync += direction.eq(r[f"negative_{a}"])
-        stages = ("pending", "prepared", "refused", "waiting")
+        stages = ("pending", "prepared", "refused", "decided", "waiting")
         stages += ("chosen",) if self.axes == 2 else ()
-        m.d.comb += self.busy.eq(~r["idle"] | Cat(r[name] for name in stages).any())
+        m.d.comb += self.busy.eq(r["works"] | Cat(r[name] for name in stages).any())
         return m
 
     def _accept(self, m: Module, leaves: Value, room: Value) -> None:
@@ -315,6 +351,8 @@ class ExactLine(Part):
                 r["weighed"].eq(stays),
                 r["sum_down"].eq((x + y)[-1]),
                 r["difference_down"].eq((x - y)[-1]),
+                # All bits but the sign: no way, or one too long.
+                *[r[f"bare_{a}"].eq(r[f"delta_{a}"][:n] == 0) for a in "xy"],
             ]
 
     def _too_long(self) -> Value:
@@ -332,10 +370,11 @@ class ExactLine(Part):
             # Of equal ways that of x leads, unless it goes downwards.
             follow_x.eq(Mux(same, r["difference_down"], r["sum_down"]) ^ x[-1]),
         ]
-        with m.If(leaves):
+        m.d.sync += r["chosen"].eq(leaves | (r["chosen"] & ~room))
+        with m.If(~r["chosen"]):
             m.d.sync += [
-                r["chosen"].eq(1),
                 r["way_fault"].eq(self._too_long()),
+                r["way_bare"].eq(Mux(follow_x, r["bare_y"], r["bare_x"])),
                 r["way_follow"].eq(Mux(follow_x, x, y)),
                 # An inverted operand is free here, and not in front of an adder.
                 r["way_lead"].eq(Mux(follow_x, y, x) ^ same.replicate(self.width + 1)),
@@ -347,19 +386,30 @@ class ExactLine(Part):
                     r[f"way_start_{a}"].eq(r[f"start_{a}"]),
                     r[f"way_negative_{a}"].eq(r[f"delta_{a}"][-1]),
                 ]
-        with m.Elif(room):
-            m.d.sync += r["chosen"].eq(0)
 
-    def _prepare_plane(self, m: Module, takes: Value) -> None:
+    def _hand_on(self, m: Module, takes: Value, refused: Value) -> None:
+        """Hold a block prepared, or refused, until it is loaded or answered."""
+        r = self.registers
+        prepared, kept = Signal(name="prepared_on"), Signal(name="refused_on")
+        m.d.comb += [
+            prepared.eq(r["prepared"] & ~self.given),
+            kept.eq(r["refused"] & ~self.answer),
+        ]
+        m.d.sync += [
+            r["prepared"].eq((takes & ~refused) | prepared),
+            r["refused"].eq((takes & refused) | kept),
+            r["room"].eq(~(takes | prepared | kept)),
+        ]
+
+    def _prepare_plane(self, m: Module, takes: Value, room: Value) -> None:
         """Work out addends and first residual of the follower."""
         r, n = self.registers, self.width
         way, lead, same = r["way_follow"], r["way_lead"], r["way_same"]
-        none = Signal(name="none")
-        m.d.comb += none.eq((lead[:n] ^ same.replicate(n)) == 0)
-        with m.If(takes):
+        none = r["way_bare"]
+        bad = none | r["way_fault"]
+        self._hand_on(m, takes, bad)
+        with m.If(room):
             m.d.sync += [
-                r["prepared"].eq(~none & ~r["way_fault"]),
-                r["refused"].eq(none | r["way_fault"]),
                 r["ready_fault"].eq(r["way_fault"] | (none & (lead[n] != same))),
                 r["ready_lead"].eq(lead),
                 r["ready_follow_x"].eq(r["way_follow_x"]),
@@ -399,14 +449,13 @@ class ExactLine(Part):
         with m.Elif(leaves):
             m.d.sync += [r["weighed"].eq(0), reach.eq(0)]
 
-    def _prepare_space(self, m: Module, takes: Value) -> None:
+    def _prepare_space(self, m: Module, takes: Value, room: Value) -> None:
         """Work out addends and first residuals of more than two axes."""
         r, n = self.registers, self.width
         reach = r["reach"]
-        with m.If(takes):
+        self._hand_on(m, takes, (reach == 0) | reach[n] | self._too_long())
+        with m.If(room):
             m.d.sync += [
-                r["prepared"].eq((reach != 0) & ~reach[n] & ~self._too_long()),
-                r["refused"].eq((reach == 0) | reach[n] | self._too_long()),
                 r["ready_fault"].eq(self._too_long() | reach[n]),
                 r["ready_lead"].eq(reach),
             ]
@@ -423,45 +472,56 @@ class ExactLine(Part):
                 ]
 
     def _count(self, m: Module, go: Value, load: Value) -> None:
-        """Count the steps left of the leading axis: negative from the last one on."""
-        r, left = self.registers, self.left
-        count, down = r["ready_lead"], 0
-        if self.axes == 2:
-            # Turned over where the leader goes downwards, which leaves its length less 1.
-            count = count ^ (~r["ready_gain"][-1]).replicate(self.width + 1)
-            down = Mux(r["ready_follow_x"], r["ready_negative_y"], r["ready_negative_x"])
-        # Less two, or less one, when the block starts: P5 is to be known two steps ahead.
-        less = Cat(r["one"], Const(-1, self.width)).as_signed()
+        """Count the steps of the leading axis: up to 0, the last one, and 1 between blocks."""
+        r, n, left = self.registers, self.width, self.left
+        lead = r["ready_lead"]
+        count, counted = Signal(n + 1, name="count"), Signal(n + 1, name="counted")
+        more = r["more"] if self.axes == 2 else r["loaded"]
+        m.d.comb += [
+            # −1 less its length, or where the leader of the plane goes downwards just less that:
+            # ``more`` makes up for it in the clock after.
+            count.eq(lead ^ (~lead[-1]).replicate(n + 1)),
+            counted.eq((Cat(1, left) + Cat(more, r["works"]))[1 : n + 2]),
+            # What is counted is 1 when a block is loaded: it is loaded around the carry.
+            self.loaded_count.eq(Mux(load, count ^ 1, 0)),
+        ]
         with m.If(go):
-            m.d.sync += [r["one"].eq(~load | down), left.eq(Mux(load, count, left + less))]
+            m.d.sync += left.eq(counted ^ self.loaded_count)
+            if self.axes == 2:
+                down = Mux(r["ready_follow_x"], r["ready_negative_y"], r["ready_negative_x"])
+                m.d.sync += more.eq(load & ~down)
 
-    def _follow(self, m: Module, f: str, go: Value, load: Value) -> Value:
-        """Describe a follower; give whether it moves with the step that begins to wait."""
+    def _follow(self, m: Module, f: str, go: Value, rests: Value) -> Signal:
+        """Describe a follower; tell whether it moves with the step that is decided."""
         r = self.registers
         total, addend, often = r[f"total{f}"], r[f"addend{f}"], r[f"often{f}"]
         rest, rare = r[f"ready_rest{f}"], Signal(name=f"next_rare{f}")
         moves = Signal(name=f"moves{f}")
-        settled = ~r["loaded"] & ~r["starting"]
         m.d.comb += [
-            rare.eq(~r[f"rare{f}"] & settled & (total[-1] ^ r[f"first{f}"])),
+            rare.eq(~r[f"rare{f}"] & (total[-1] ^ r[f"first{f}"])),
             moves.eq(rare ^ often),
         ]
         with m.If(go):
-            m.d.sync += [
-                r[f"rare{f}"].eq(rare),
-                total.eq(total + addend),
-                addend.eq(Mux(moves, r[f"loss{f}"], r[f"gain{f}"])),
-            ]
-            with m.If(load):
-                # The first residual goes through the addend into an empty total.
+            m.d.sync += r[f"rare{f}"].eq(rare | rests | r["loaded"])
+            with m.If(rests):
                 m.d.sync += [
-                    total.eq(0),
-                    addend.eq(rest),
                     often.eq(rest[-1] ^ ~r[f"ready_gain{f}"][-1]),
                     r[f"first{f}"].eq(rest[-1]),
                     r[f"gain{f}"].eq(r[f"ready_gain{f}"]),
                     r[f"loss{f}"].eq(r[f"ready_loss{f}"]),
                 ]
+        # Both are 0 when a block is loaded: its first residual goes around the carry.
+        with m.If(go & rests):
+            m.d.sync += [total.eq(0), addend.eq(0)]
+        with m.Elif(go):
+            m.d.sync += [
+                total.eq((total + addend)[: self.width + 1] ^ r[f"rest{f}"]),
+                addend.eq(Mux(moves, r[f"loss{f}"], r[f"gain{f}"])),
+            ]
+        with m.If(go & ~rests):
+            m.d.sync += r[f"rest{f}"].eq(0)
+        with m.Elif(go):
+            m.d.sync += r[f"rest{f}"].eq(rest)
         return moves
 
 

@@ -116,6 +116,8 @@ class FeedUnit(Part):
         1023. None: 256·√k. The exercise has 1.4: (256, 358).
     pairing : bool
         Steps on different axes that follow each other are one move.
+    multiplier : bool
+        F times the override by a multiplier of the FPGA, not by adders.
 
     Attributes
     ----------
@@ -134,9 +136,17 @@ class FeedUnit(Part):
 
     notation = "F = feed, in steps per clock"
 
-    def __init__(self, axes: int = 2, *, pauses: Sequence[int] | None = None, pairing: bool = True):
+    def __init__(
+        self,
+        axes: int = 2,
+        *,
+        pauses: Sequence[int] | None = None,
+        pairing: bool = True,
+        multiplier: bool = False,
+    ):
         check_axes(axes)
         check_flag("pairing", pairing)
+        check_flag("multiplier", multiplier)
         chosen = PAUSES[:axes] if pauses is None else tuple(pauses)
         _check_pauses(chosen, axes)
         super().__init__(
@@ -159,7 +169,13 @@ class FeedUnit(Part):
         self.axes = axes
         self.pauses = chosen
         self.pairing = pairing
-        self.parameters: dict[str, object] = {"axes": axes, "pauses": chosen, "pairing": pairing}
+        self.multiplier = multiplier
+        self.parameters: dict[str, object] = {
+            "axes": axes,
+            "pauses": chosen,
+            "pairing": pairing,
+            "multiplier": multiplier,
+        }
 
         self.product = Signal(_PRODUCT_BITS)
         self.exponent = Signal(_EXPONENT_BITS)
@@ -178,10 +194,13 @@ class FeedUnit(Part):
             "start pulses": [self.rate, self.debt, self.cell],
             "single step": [self.single_before, self.single_step],
         }
-        self.intermediates = {
-            f"sum_{bit}": Signal(min(_MANTISSA_BITS + 2 + bit, _PRODUCT_BITS), name=f"sum_{bit}")
-            for bit in range(1, MAX_OVERRIDE.bit_length())
-        }
+        if not multiplier:
+            self.intermediates = {
+                f"sum_{bit}": Signal(
+                    min(_MANTISSA_BITS + 2 + bit, _PRODUCT_BITS), name=f"sum_{bit}"
+                )
+                for bit in range(1, MAX_OVERRIDE.bit_length())
+            }
         self.registers: dict[str, Signal] = {
             register.name: register for group in self.diagram.values() for register in group
         }
@@ -208,15 +227,21 @@ class FeedUnit(Part):
         return m
 
     def _set_target(self, m: Module) -> None:
-        """F and the override, multiplied by shifted additions, then shifted by the exponent."""
+        """F and the override multiplied, by shifted additions, and shifted by the exponent."""
         factor = Signal(OVERRIDE_BITS)
         significand = Signal(_MANTISSA_BITS + 1)
         shifted = Signal(_PRODUCT_BITS + RATE_BITS - _MANTISSA_BITS - 7)
-        rows = [Mux(factor[bit], significand << bit, 0) for bit in range(MAX_OVERRIDE.bit_length())]
-        total = rows[0]
-        for row, partial in zip(rows[1:], self.intermediates.values(), strict=True):
-            m.d.comb += partial.eq(total + row)
-            total = partial
+        if self.multiplier:
+            # The leading 1 aside: the multipliers of an iCE40 take 16 bits.
+            total = (factor << _MANTISSA_BITS) + self.feed.mantissa * factor
+        else:
+            rows = [
+                Mux(factor[bit], significand << bit, 0) for bit in range(MAX_OVERRIDE.bit_length())
+            ]
+            total = rows[0]
+            for row, partial in zip(rows[1:], self.intermediates.values(), strict=True):
+                m.d.comb += partial.eq(total + row)
+                total = partial
         m.d.comb += [
             factor.eq(Mux(self.override > MAX_OVERRIDE, MAX_OVERRIDE, self.override)),
             significand.eq(Cat(self.feed.mantissa, Const(1, 1))),
@@ -234,43 +259,44 @@ class FeedUnit(Part):
     def _ramp(self, m: Module) -> None:
         """Let the velocity climb and fall, and know how far braking takes."""
         falls, climbs, above = Signal(), Signal(), Signal()
+        stops, brakes = Signal(), Signal()
+        lower = Signal.like(self.velocity, name="lower")
         slower = Signal.like(self.velocity, name="slower")
-        way, way_slower = (
-            Signal(RATE_BITS + 1 - (RATE_BITS - _BRAKING_FRACTION), name=name)
-            for name in ("way", "way_slower")
-        )
-        brakes = Signal()
+        way = Signal(len(self.velocity) - (RATE_BITS - _BRAKING_FRACTION))
         m.d.comb += [
             brakes.eq(self.braking >> (_BRAKING_FRACTION - _PAUSE_FRACTION) >= self.to_go),
-            above.eq(self.velocity >= self.target + self.acceleration),
+            stops.eq(self.velocity < self.acceleration),
+            lower.eq(self.velocity - self.acceleration),
+            above.eq(~stops & (lower >= self.target)),
             # A target of 0 is reached however small v is, also where a has grown since.
             falls.eq(brakes | above | (self.target == 0)),
             climbs.eq(~falls & (self.velocity < self.target)),
-            slower.eq(Mux(self.velocity < self.acceleration, 0, self.velocity - self.acceleration)),
-            way.eq(self.velocity >> (RATE_BITS - _BRAKING_FRACTION)),
-            way_slower.eq(slower >> (RATE_BITS - _BRAKING_FRACTION)),
+            slower.eq(Mux(stops, 0, lower)),
+            way.eq(Mux(falls, slower, self.velocity) >> (RATE_BITS - _BRAKING_FRACTION)),
         ]
+        # B ± way by one adder: ~B + way is ~(B − way).
+        flipped = Mux(falls, ~self.braking, self.braking)
+        total = Signal(len(self.braking) + 1)
+        m.d.comb += total.eq(flipped + way)
         with m.If(~self.active | (self.acceleration == 0)):
             m.d.sync += [self.velocity.eq(0), self.braking.eq(0)]
         with m.Elif(falls):
             m.d.sync += [
                 self.velocity.eq(slower),
-                self.braking.eq(
-                    Mux((slower == 0) | (self.braking < way_slower), 0, self.braking - way_slower)
-                ),
+                self.braking.eq(Mux((slower == 0) | total[-1], 0, ~total[:-1])),
             ]
         with m.Elif(climbs):
             m.d.sync += [
                 self.velocity.eq(self.velocity + self.acceleration),
-                self.braking.eq(self.braking + way),
+                self.braking.eq(total[:-1]),
             ]
         with m.If(~self.active):
             m.d.sync += self.rate.eq(0)
         with m.Elif(self.acceleration == 0):
             m.d.sync += self.rate.eq(self.target)
         with m.Else():
-            lower = self.velocity < self.target
-            m.d.sync += self.rate.eq(Mux(above | lower, self.velocity, self.target))
+            below = self.velocity < self.target
+            m.d.sync += self.rate.eq(Mux(above | below, self.velocity, self.target))
 
     def _pause(self, m: Module) -> None:
         """Reckon what is left of the pause, and of the path."""
@@ -295,12 +321,10 @@ class FeedUnit(Part):
             Mux(self.debt < 0, self.debt, 0) + (cost << (RATE_BITS - _PAUSE_FRACTION))
         )
         with m.If(self.taken):
-            m.d.sync += [
-                self.debt.eq(Mux(owed < 0, 0, owed) - self.rate),
-                self.cell.eq(Mux(self.even, 0, together)),
-            ]
-        with m.Elif(self.debt > 0):
-            m.d.sync += self.debt.eq(self.debt - self.rate)
+            m.d.sync += self.cell.eq(Mux(self.even, 0, together))
+        with m.If(self.taken | (self.debt > 0)):
+            left = Mux(self.taken, Mux(owed < 0, 0, owed), self.debt)
+            m.d.sync += self.debt.eq(left - self.rate)
 
         one = 1 << _PAUSE_FRACTION
         with m.If(self.begins):

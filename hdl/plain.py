@@ -8,7 +8,7 @@ from amaranth.lib import data, wiring
 
 from discreta.hdl.contract import Part
 
-__all__ = ["PlainPorts", "block_fields"]
+__all__ = ["PlainPorts", "block_fields", "leaves"]
 
 
 class PlainPorts(Part):
@@ -43,7 +43,7 @@ class PlainPorts(Part):
         members: dict[str, wiring.Member] = {}
         for path, member, value in core.signature.flatten(core):
             path = tuple(str(item) for item in path if item != "payload")
-            for name, shape, leaf in _leaves(path, member.shape, value):
+            for name, shape, leaf in leaves(path, member.shape, value):
                 members[name] = wiring.Member(member.flow, shape)
                 self._inner[name] = leaf
         for observed_name, signal in (observe or {}).items():
@@ -74,14 +74,14 @@ class PlainPorts(Part):
 def block_fields(core: Part) -> tuple[str, ...]:
     """Name the plain ports of an interpolator's or a device's blocks."""
     payload = core.blocks.payload
-    return tuple(name for name, *_ in _leaves(("blocks",), payload.shape(), payload))
+    return tuple(name for name, *_ in leaves(("blocks",), payload.shape(), payload))
 
 
-def _leaves(path, shape, value):
-    """Yield (name, shape, value) of every plain vector in ``value``."""
+def leaves(path, shape, value):
+    """Yield (name, shape, value) of every plain vector in ``value``, the name behind a path."""
     if isinstance(shape, data.StructLayout):
         for key, field in shape:
-            yield from _leaves((*path, key), field.shape, value[key])
+            yield from leaves((*path, key), field.shape, value[key])
     else:
         plain = shape.as_shape() if isinstance(shape, ShapeCastable) else shape
         yield "_".join(path), plain, Value.cast(value)

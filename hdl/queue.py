@@ -27,6 +27,7 @@ __all__ = [
     "BlockKind",
     "BlockQueue",
     "StopReason",
+    "check_depth",
     "device_block_layout",
 ]
 
@@ -170,7 +171,7 @@ class BlockQueue(Part):
         check_axes(axes)
         kinds = tuple(layouts)
         _check_kinds(kinds)
-        _check_depth(depth)
+        check_depth(depth)
         self.letters = AXIS_LETTERS[:axes]
         point = point_layout(width, axes)
         layout = device_block_layout(width, axes, layouts)
@@ -427,7 +428,7 @@ def _check_kinds(kinds: tuple[str, ...]) -> None:
         )
 
 
-def _check_depth(depth: int) -> None:
+def check_depth(depth: int) -> None:
     """Raise ``TypeError`` or ``ValueError`` unless ``depth`` is a whole number from 1 to 4096."""
     limits = f"a whole number from 1 to {MAX_DEPTH}"
     if not isinstance(depth, int) or isinstance(depth, bool):

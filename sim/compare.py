@@ -4,11 +4,12 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
+from discreta.sim.fpga import check_tools
 from discreta.sim.groups import survey_groups
 from discreta.sim.methods import METHODS
 from discreta.sim.speed import limits
 from discreta.sim.survey import SurveyRow, survey
-from discreta.sim.synth import RUNS, SEEDS, Measurement, check_tools, measure
+from discreta.sim.synth import RUNS, SEEDS, Measurement, measure
 
 __all__ = ["PASSES", "SURVEY_WIDTH", "ComparisonRow", "compare"]
 
@@ -74,7 +75,7 @@ def compare(
     width : int
         n of the pace and of the cells, 4 to 32; a method that ends before has as many as it can.
     device : str
-        One of :data:`~discreta.sim.synth.DEVICES`.
+        One of :data:`~discreta.sim.fpga.FPGAS`.
     seeds : iterable of int
         Those of the placements.
     progress : callable

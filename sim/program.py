@@ -18,11 +18,13 @@ from typing import Any
 
 import numpy as np
 
+from discreta.hdl.constant_speed import constant_arc
 from discreta.hdl.contract import AXIS_LETTERS, Part
 from discreta.hdl.device import Device
 from discreta.hdl.plain import block_fields
-from discreta.sim.contour import ArcContour, LineContour
-from discreta.sim.feed import ahead, encode_feed, octagon
+from discreta.sim.constant_speed import paced, plane, ticks_of
+from discreta.sim.contour import HelixContour, LineContour
+from discreta.sim.feed import ahead, encode_feed
 from discreta.sim.gcode import Move, distance_from_arc
 from discreta.sim.machine import Drive, Machine, Trail, device_blocks, pace_limit_of, path_of
 from discreta.sim.methods import METHODS
@@ -66,7 +68,9 @@ class Program:
 
     def blocks(self, kind: str) -> np.ndarray:
         """Give the blocks of the moves of a kind, shape (moves, block fields)."""
-        rows = [self.moves[i].block for i in self.which(kind)]
+        flat = kind == "line" or self.axes == 2
+        which = (self.moves[i] for i in self.which(kind))
+        rows = [move.block if flat else (*move.start, *move.end, *move.block[4:]) for move in which]
         return np.array(rows, dtype=np.int64).reshape(len(rows), -1)
 
     def errors(self, number: int, points: np.ndarray) -> np.ndarray:
@@ -174,13 +178,18 @@ def program_blocks(
     fields = list(block_fields(device))
     blocks = np.zeros((1 + len(program.moves), len(fields)), dtype=np.int64)
     paths = np.zeros(len(program.moves))
-    for kind in device.interpolators:
+    for kind in [kind for kind in device.interpolators if len(program.which(kind))]:
         part = _Part(kind, program.axes, program.start, program.blocks(kind))
         made = device_blocks(device, part, drive)
         blocks[0] = made[0]
         blocks[1 + program.which(kind)] = made[1:]
         paths[program.which(kind)] = path_of(device, part)
-    encoded = np.array([encode_feed(feed) for feed in feeds])
+    # A tick of a helix is a step of arc or of Z, whichever way is longer.
+    ticked = [
+        feed * Fraction(min(1.0, path / move.true_length)) if move.helical else feed
+        for feed, path, move in zip(feeds, paths.tolist(), program.moves, strict=True)
+    ]
+    encoded = np.array([encode_feed(feed) for feed in ticked])
     blocks[1:, fields.index("blocks_feed_mantissa")] = encoded[:, 0]
     blocks[1:, fields.index("blocks_feed_exponent")] = encoded[:, 1]
     blocks[1:, fields.index("blocks_ahead")] = ahead(paths)
@@ -240,29 +249,34 @@ class Cores:
     def __init__(self, program: Program, width: int):
         self._program, self._width = program, width
         self.kinds = [kind for kind in CORES if len(program.which(kind))]
-        for move in program.moves:
-            if move.helical:
-                raise BadInputError(
-                    f"line {move.line_number} is an arc along which Z moves, and "
-                    f"{CORES['arc'].name} has {CORES['arc'].axes[0]} axes: leave Z out, or make it "
-                    "of lines"
-                )
-        self._axes = {kind: program.axes if kind == "line" else 2 for kind in self.kinds}
         self._blocks = {kind: program.blocks(kind) for kind in self.kinds}
+        self._given = dict(self._blocks)
+        if program.axes > 2 and "arc" in self.kinds:
+            self._given["arc"] = paced("arc", self._blocks["arc"], width, program.axes)
         self._limits = {kind: self._limit(kind) for kind in self.kinds}
         self.limit = sum(self._limits.values())
         self.ends_reached = self.clocks = 0
         self._steps: dict[str, _Steps] = {}
 
     def _limit(self, kind: str) -> int:
-        method = CORES[kind]
-        golden = method.model(self._width, self._axes[kind])
-        return int(method.clocks(golden, self._blocks[kind]).sum()) + _OVERHEAD
+        method, axes = CORES[kind], self._program.axes
+        blocks, ticks = self._blocks[kind], np.zeros(1)
+        if kind == "arc" and axes > 2:
+            ticks = ticks_of(kind, blocks, axes) + _OVERHEAD
+            blocks, axes = plane(blocks, axes), 2
+        golden = method.model(self._width, axes)
+        return int(np.sum(method.clocks(golden, blocks) + ticks)) + _OVERHEAD
 
     @cached_property
     def parts(self) -> dict[str, Part]:
         """Make the RTL of every kind."""
-        return {kind: CORES[kind].core(self._width, self._axes[kind]) for kind in self.kinds}
+        width, axes = self._width, self._program.axes
+        return {
+            kind: constant_arc(width, axes)
+            if kind == "arc" and axes > 2
+            else CORES[kind].core(width, axes)
+            for kind in self.kinds
+        }
 
     def run(self, engine: str, progress: Callable[[int], object] | None = None) -> None:
         """Run the moves of every kind through their core, every step taken at once.
@@ -271,11 +285,11 @@ class Cores:
         """
         ran = 0
         for kind, core in self.parts.items():
-            blocks = self._blocks[kind]
-            contour = {"line": LineContour, "arc": ArcContour}[kind](blocks)
-            axes, last = self._axes[kind], 0
+            blocks, axes, last = self._blocks[kind], self._program.axes, 0
+            contour = LineContour(blocks) if kind == "line" else HelixContour(blocks, axes)
             moved, gaps = [], []
-            for stretch in simulate(core, blocks, limit=self._limits[kind], engine=engine):
+            given, limit = self._given[kind], self._limits[kind]
+            for stretch in simulate(core, given, limit=limit, engine=engine):
                 when, _, _ = contour.follow(stretch)
                 taken = stretch.events[:, EVENT_COLUMNS.index("taken")] == 1
                 first = len(EVENT_COLUMNS)
@@ -299,11 +313,12 @@ class Cores:
         clock = 0
         for number, move in enumerate(self._program.moves):
             moved, gaps = next(steps[move.kind])
-            points = np.tile(np.array(move.start, dtype=np.int64), (len(moved), 1))
-            points[:, : moved.shape[1]] += np.cumsum(moved, axis=0, dtype=np.int64)
+            points = np.array(move.start) + np.cumsum(moved, axis=0, dtype=np.int64)
             when = clock + np.cumsum(gaps, dtype=np.int64)
             clock = int(when[-1])
-            yield number, when, points
+            # Some ticks of an arc with a further axis move nothing.
+            moves = moved.any(axis=1)
+            yield number, when[moves], points[moves]
 
 
 @dataclass(frozen=True)
@@ -374,11 +389,6 @@ def run_program(
         The device does not answer.
     """
     cores = Cores(program, width)
-    if drive is not None and program.axes > 2 and "arc" in cores.kinds:
-        raise BadInputError(
-            f"the program has arcs and moves Z: on the device {CORES['arc'].name} has "
-            f"{CORES['arc'].axes[0]} axes; leave out --clock and what goes with it, or Z"
-        )
     if vcd is not None and drive is None:
         raise BadInputError("--vcd shows the device: give --clock, too")
     engine = choose_engine(engine, trace=trace, vcd=vcd, summary_file=summary_file)
@@ -480,7 +490,7 @@ def _pace_limit(
     """Give the most clocks that a program may take on the device."""
     paths = np.zeros(len(program.moves))
     for kind in CORES:
-        paths[program.which(kind)] = octagon(program.blocks(kind), kind)
+        paths[program.which(kind)] = ticks_of(kind, program.blocks(kind), program.axes)
     given = np.array(feeds, dtype=float)
     pauses = float((paths / given).sum())
     return pace_limit_of(

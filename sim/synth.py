@@ -12,19 +12,12 @@ Source: none, it is ours.
 """
 
 import json
-import os
 import re
-import signal
 import statistics
-import subprocess
-import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -33,17 +26,23 @@ from amaranth.back import rtlil
 from discreta.hdl.contract import Part, check_choice
 from discreta.hdl.harness import Harness, bit_name
 from discreta.hdl.plain import PlainPorts
-from discreta.sim.yosys import yosys
+from discreta.sim.fpga import (
+    FPGAS,
+    MAP,
+    Fpga,
+    Runner,
+    SynthesisError,
+    check_tools,
+    nextpnr,
+    synthesize,
+    utilization,
+)
 
 __all__ = [
-    "DEVICES",
     "RUNS",
     "SEEDS",
     "CriticalPath",
-    "Fpga",
     "Measurement",
-    "SynthesisError",
-    "check_tools",
     "measure",
 ]
 
@@ -56,142 +55,11 @@ RUNS = 3 + len(SEEDS)
 #: MHz asked for: more than any core reaches, so that nextpnr never rests.
 _TARGET = 400
 
-#: The files with what an FPGA has of cells of its own, and of places of pins.
-_MAP, _PINS = "map.v", "pins.cst"
-
-#: Seconds between two looks at what runs.
-_POLL = 0.02
+#: Passes that leave the ports of a core open.
+_ALONE = ("delete -port x:*", "delete t:?BUF")
 
 #: What the way out of a carry cell is called.
 _CARRY_OUT = ("COUT", "FCO")
-
-
-class SynthesisError(Exception):
-    """Yosys or nextpnr made nothing of a core; the message is what they say."""
-
-
-@dataclass(frozen=True)
-class Fpga:
-    """An FPGA, and what makes a circuit of it.
-
-    Attributes
-    ----------
-    name, title : str
-    synthesis : str
-        The command of Yosys, without its top module and its output.
-    place : str
-        The part of the name of nextpnr's package that follows ``yowasp_nextpnr_``.
-    options : tuple of str
-        What nextpnr is told of the FPGA.
-    logic : str
-        What nextpnr calls a LUT that is taken, be it as a LUT, for a carry or on the way to a
-        flip-flop. On iCE40 every flip-flop takes one.
-    cells : dict of str to str
-        Regular expressions of the types of cells to count, by what is counted.
-    map : str
-        Verilog modules that stand for cells in the end, as Yosys' ``techmap`` takes them.
-    pins : str
-        Places of the harness's pins, for a nextpnr that chooses none, in its own words.
-    """
-
-    name: str
-    title: str
-    synthesis: str
-    place: str
-    options: tuple[str, ...]
-    logic: str
-    cells: dict[str, str]
-    map: str = ""
-    pins: str = ""
-
-
-# nextpnr knows the delays of Gowin's LUT4 alone: what goes through a smaller one it takes for no
-# path at all, and may find a clock of more than twice the real one.
-_LUT4 = """
-(* techmap_celltype = "LUT1" *)
-module lut1 (input I0, output F);
-    parameter INIT = 2'b0;
-    LUT4 #(.INIT({8{INIT[1:0]}})) _TECHMAP_REPLACE_ (
-        .I0(I0), .I1(1'b0), .I2(1'b0), .I3(1'b0), .F(F)
-    );
-endmodule
-(* techmap_celltype = "LUT2" *)
-module lut2 (input I0, I1, output F);
-    parameter INIT = 4'b0;
-    LUT4 #(.INIT({4{INIT[3:0]}})) _TECHMAP_REPLACE_ (
-        .I0(I0), .I1(I1), .I2(1'b0), .I3(1'b0), .F(F)
-    );
-endmodule
-(* techmap_celltype = "LUT3" *)
-module lut3 (input I0, I1, I2, output F);
-    parameter INIT = 8'b0;
-    LUT4 #(.INIT({2{INIT[7:0]}})) _TECHMAP_REPLACE_ (
-        .I0(I0), .I1(I1), .I2(I2), .I3(1'b0), .F(F)
-    );
-endmodule
-"""
-
-_HX8K = Fpga(
-    name="hx8k",
-    title="Lattice iCE40 HX8K",
-    synthesis="synth_ice40 -device hx",
-    place="ice40",
-    options=("--hx8k", "--package", "ct256"),
-    logic="ICESTORM_LC",
-    cells={
-        "luts": "SB_LUT4",
-        "carries": "SB_CARRY",
-        "multipliers": "SB_MAC16",
-        "memories": "SB_RAM40_4K.*",
-        "flip_flops": "SB_DFF.*",
-    },
-)
-
-DEVICES = {
-    fpga.name: fpga
-    for fpga in (
-        _HX8K,
-        replace(
-            _HX8K,
-            name="up5k",
-            title="Lattice iCE40 UP5K",
-            synthesis="synth_ice40 -device u -dsp",
-            options=("--up5k", "--package", "sg48"),
-        ),
-        Fpga(
-            name="ecp5-25k",
-            title="Lattice ECP5-25",
-            synthesis="synth_ecp5",
-            place="ecp5",
-            options=("--25k", "--speed", "6", "--package", "CABGA381"),
-            logic="TRELLIS_COMB",
-            cells={
-                "luts": "LUT4",
-                "carries": "CCU2C",
-                "multipliers": "MULT.*|ALU54B",
-                "memories": "DP16KD|PDPW16KD",
-                "flip_flops": "TRELLIS_FF",
-            },
-        ),
-        Fpga(
-            name="gw1n-9",
-            title="Gowin GW1NR-9",
-            synthesis="synth_gowin -family gw1n -nowidelut",
-            place="himbaechel_gowin",
-            options=("--device", "GW1NR-LV9QN88PC6/I5", "--vopt", "family=GW1N-9C"),
-            logic="LUT4",
-            cells={
-                "luts": "LUT4",
-                "carries": "ALU",
-                "multipliers": "MULT.*|ALU54D",
-                "memories": "(DP|SDP|SP|ROM|DPX9|SDPX9|SPX9|ROMX9)B?",
-                "flip_flops": "DFF.*",
-            },
-            map=_LUT4,
-            pins='IO_LOC "clk" 52;\nIO_LOC "d" 25;\nIO_LOC "q" 26;\n',
-        ),
-    )
-}
 
 
 @dataclass(frozen=True)
@@ -262,16 +130,6 @@ class Measurement:
         return self.median / limit.median
 
 
-def check_tools(device: str) -> None:
-    """Raise :class:`ModuleNotFoundError` if Yosys or nextpnr is not there for one of the devices.
-
-    To be asked before a core is made, as one that is made must be used.
-    """
-    for needed in ("pyosys", f"yowasp_nextpnr_{DEVICES[device].place}"):
-        if find_spec(needed) is None:
-            raise ModuleNotFoundError(f"no module named {needed!r}", name=needed)
-
-
 def measure(
     core: Part,
     device: str = "hx8k",
@@ -287,7 +145,7 @@ def measure(
     core : Part
         Its ``registers``, if it has such an attribute, name the ends of the critical path.
     device : str
-        One of :data:`DEVICES`.
+        One of :data:`FPGAS`.
     seeds : iterable of int
         Those of the placements, at least one.
     workers : int
@@ -304,8 +162,8 @@ def measure(
     SynthesisError
         Yosys refuses the core, or nextpnr has no cells of a kind that it needs.
     """
-    check_choice("device", device, tuple(DEVICES))
-    fpga, seeds = DEVICES[device], tuple(seeds)
+    check_choice("device", device, tuple(FPGAS))
+    fpga, seeds = FPGAS[device], tuple(seeds)
     if not seeds:
         raise ValueError("seeds are none: give one or more whole numbers")
     check_tools(device)
@@ -317,19 +175,20 @@ def measure(
         write = Path(folder, "harness.il").write_text
         write(rtlil.convert(harness, ports=pins, name="harness", emit_src=False))
         Path(folder, "core.il").write_text(rtlil.convert(top, name="core", emit_src=False))
-        Path(folder, _MAP).write_text(fpga.map)
-        Path(folder, _PINS).write_text(fpga.pins)
-        run = _Runner(folder, workers, progress)
-        run(*(_synthesize(fpga, module) for module in ("core", "harness")))
-        (log,) = run(_nextpnr(fpga, "--json", "core.json", "--pack-only"))
-        used = {kind: int(count) for kind, count in re.findall(r"(\w+): +(\d+)/ *\d+", log)}
+        Path(folder, MAP).write_text(fpga.map)
+        Path(folder, f"top.{fpga.tools.constraints}").write_text(fpga.pins)
+        run = Runner(folder, workers, progress)
+        run(synthesize(fpga, "core", *_ALONE), synthesize(fpga, "harness"))
+        (log,) = run(nextpnr(fpga, "--json", "core.json", "--pack-only"))
         types = [cell["type"] for cell in _module(folder / "core.json")["cells"].values()]
         cells = Counter(kind for kind in sorted(types) if not kind.startswith("$"))
         counts: dict[str, Any] = {
             what: sum(count for kind, count in cells.items() if re.fullmatch(kinds, kind))
             for what, kinds in fpga.cells.items()
         }
-        measured = Measurement(**counts, cells=dict(cells), logic_cells=used[fpga.logic])
+        measured = Measurement(
+            **counts, cells=dict(cells), logic_cells=utilization(log)[fpga.logic][0]
+        )
         try:
             run(*(_place(fpga, seed) for seed in seeds))
         except SynthesisError as error:
@@ -353,79 +212,11 @@ def _module(file: Path) -> Any:
     )
 
 
-def _synthesize(fpga: Fpga, module: str) -> list[str]:
-    command = f"{fpga.synthesis} -top {module}"
-    # Flip-flops are named after their registers as long as these have their own values: one that
-    # starts from 1 is inverted where there are none but those that start from 0.
-    return yosys(
-        f"read_rtlil {module}.il",
-        f"{command} -run begin:map_ffs",
-        "rename -wire t:$_*DFF*_",
-        f"{command} -run map_ffs:",
-        f"techmap -map {_MAP}",
-        *(["delete -port x:*", "delete t:?BUF"] if module == "core" else []),
-        f"write_json {module}.json",
-    )
-
-
-def _nextpnr(fpga: Fpga, *arguments: str) -> list[str]:
-    name = f"nextpnr_{fpga.place}"
-    script = f"import sys; from yowasp_{name} import run_{name} as run; sys.exit(run(sys.argv[1:]))"
-    return [sys.executable, "-c", script, *fpga.options, *arguments]
-
-
 def _place(fpga: Fpga, seed: int) -> list[str]:
     target = ("--freq", str(_TARGET), "--timing-allow-fail", "--seed", str(seed))
     results = ("--report", f"report-{seed}.json", "--write", f"placed-{seed}.json")
-    pins = ("--vopt", f"cst={_PINS}") if fpga.pins else ()
-    return _nextpnr(fpga, "--json", "harness.json", *target, *results, *pins)
-
-
-class _Runner:
-    """Runs commands in a folder, some at once, and ends them when it is interrupted."""
-
-    def __init__(self, folder: Path, workers: int, progress: Callable[[], None]):
-        self._folder, self._workers, self._progress = folder, workers, progress
-
-    def __call__(self, *commands: list[str]) -> list[str]:
-        """Run all of them; give what each has said."""
-        logs = [self._folder / f"{number}.log" for number in range(len(commands))]
-        waiting = list(zip(commands, logs, strict=True))
-        running: dict[Path, subprocess.Popen] = {}
-        try:
-            while waiting or running:
-                while waiting and len(running) < self._workers:
-                    command, log = waiting.pop(0)
-                    with log.open("w") as out:
-                        # A session of its own: Yosys starts processes, too, that must end with it.
-                        running[log] = subprocess.Popen(
-                            command,
-                            cwd=self._folder,
-                            env=os.environ | {"TMPDIR": str(self._folder)},
-                            stdout=out,
-                            stderr=subprocess.STDOUT,
-                            start_new_session=True,
-                        )
-                time.sleep(_POLL)
-                for log, process in list(running.items()):
-                    if process.poll() is not None:
-                        del running[log]
-                        self._progress()
-                        if process.returncode:
-                            raise SynthesisError(_complaint(log.read_text()))
-        finally:
-            for process in running.values():
-                with suppress(ProcessLookupError):
-                    os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
-        return [log.read_text() for log in logs]
-
-
-def _complaint(log: str) -> str:
-    """Find in a log what went wrong: the error, or the last line."""
-    lines = [line for line in log.splitlines() if line.strip()] or ["it ended without a word"]
-    errors = [line for line in lines if line.startswith("ERROR: ")]
-    return (errors or lines[-1:])[0].removeprefix("ERROR: ")
+    pins = fpga.tools.read if fpga.pins else ()
+    return nextpnr(fpga, "--json", "harness.json", *target, *results, *pins)
 
 
 def _fmax(report: Any) -> float:

@@ -4,15 +4,20 @@ from typing import Any
 
 from discreta.hdl.conic import MAX_WIDTH as CONIC_MAX_WIDTH
 from discreta.hdl.constant_speed import constant_arc, constant_line
-from discreta.hdl.device import exact_device
+from discreta.hdl.device import exact_device, exact_layout
 from discreta.hdl.feed import PAUSES, FeedUnit
+from discreta.hdl.link import Link, fingerprint, layout_fields
 from discreta.hdl.pulse import KINDS as PIN_KINDS
 from discreta.hdl.pulse import PulseUnit
+from discreta.hdl.uart import UartReceiver, UartTransmitter
 from discreta.sim.golden.constant_speed import constant_arc as golden_constant_arc
 from discreta.sim.golden.constant_speed import constant_line as golden_constant_line
 from discreta.sim.golden.device import make_device as golden_device
 from discreta.sim.golden.feed import FeedUnit as GoldenFeedUnit
+from discreta.sim.golden.link import Link as GoldenLink
 from discreta.sim.golden.pulse import PulseUnit as GoldenPulseUnit
+from discreta.sim.golden.uart import UartReceiver as GoldenUartReceiver
+from discreta.sim.golden.uart import UartTransmitter as GoldenUartTransmitter
 from discreta.sim.methods import Design
 
 __all__ = ["EXERCISE_PAUSES", "UNITS"]
@@ -26,6 +31,20 @@ def _golden_device(width: int, *, kinds: tuple[str, ...], depth: int) -> Any:
     assert depth == 1
     return golden_device(width, kinds)
 
+
+def _link(width: int, axes: int = 2, *, kinds: tuple[str, ...], depth: int) -> Link:
+    """Make the link of a device that has these kinds of curves."""
+    return Link(exact_layout(width, axes, kinds), width, axes, depth)
+
+
+def _golden_link(width: int, axes: int = 2, *, kinds: tuple[str, ...], depth: int) -> GoldenLink:
+    """Make its golden model."""
+    layout = exact_layout(width, axes, kinds)
+    return GoldenLink(tuple(layout_fields(layout)), fingerprint(layout), width, axes, depth)
+
+
+#: Clocks of a bit: the fewest, an odd number, a common one; and those of 115,200 baud at 12 MHz.
+_BITS, _USUAL_BIT = (4, 5, 16), 104
 
 UNITS = {
     unit.name: unit
@@ -78,6 +97,33 @@ UNITS = {
             choices={"kinds": (("line",), ("line", "arc")), "depth": (1,)},
             settings={"default": {"kinds": ("line", "arc", "conic"), "depth": 16}},
             max_width=CONIC_MAX_WIDTH,
+        ),
+        Design(
+            name="link",
+            summary="frames over a serial line to blocks and commands, and the status back",
+            device=_link,
+            golden=_golden_link,
+            axes=(2, 3, 4, 5, 6),
+            choices={"kinds": (("line",), ("line", "arc")), "depth": (1, 16)},
+            settings={"default": {"kinds": ("line", "arc"), "depth": 16}},
+        ),
+        Design(
+            name="uart_receiver",
+            summary="a serial line to bytes",
+            device=lambda _width, **choices: UartReceiver(**choices),
+            golden=lambda _width, **choices: GoldenUartReceiver(**choices),
+            choices={"clocks_per_bit": _BITS},
+            settings={"default": {"clocks_per_bit": _USUAL_BIT}},
+            proofs="uart",
+        ),
+        Design(
+            name="uart_transmitter",
+            summary="bytes to a serial line",
+            device=lambda _width, **choices: UartTransmitter(**choices),
+            golden=lambda _width, **choices: GoldenUartTransmitter(**choices),
+            choices={"clocks_per_bit": _BITS},
+            settings={"default": {"clocks_per_bit": _USUAL_BIT}},
+            proofs="uart",
         ),
     )
 }

@@ -20,6 +20,7 @@ from discreta.hdl.comparison import Comparison
 from discreta.hdl.conic import Conic
 from discreta.hdl.contract import ErrorCode, Part
 from discreta.hdl.exact_arc import ExactArc
+from discreta.hdl.exact_line import ExactLine
 from discreta.hdl.linear import Linear
 from discreta.hdl.two_stage import TwoStage
 from discreta.sim.golden.carrier_circular import CarrierCircular as GoldenCarrierCircular
@@ -171,6 +172,7 @@ def _variant(
 
 _line, _arc = partial(_variant, "linear"), partial(_variant, "circular")
 _exact_arc = partial(_variant, "exact_arc")
+_exact_line = partial(_variant, "exact_line")
 _conic = partial(_variant, "conic")
 _comparison = partial(_variant, "comparison")
 _carrier_line = partial(_variant, "carrier_linear")
@@ -1411,3 +1413,148 @@ def missed_end_not_seen(core: ExactArc) -> None:
 def stalled_step_lost(core: ExactArc) -> None:
     """A step that is not taken at once is forgotten."""
     _clocked(core, (core.waiting, 0), when=core.waiting & ~core.steps.ready)
+
+
+# Exact lines
+
+
+def _goes(core: ExactLine) -> Value:
+    """Tell when steps go on: none waits, or it is taken."""
+    return ~core.registers["waiting"] | core.steps.ready
+
+
+@_exact_line({*ALL})
+def rare_twice_in_a_row(core: ExactLine) -> None:
+    """The sign of the residual is looked at also after a decision of the rare kind."""
+    r = core.registers
+
+    def change(m: Module) -> None:
+        with m.If(_goes(core) & r["running"] & core.left[-1]):
+            m.d.sync += r["rare"].eq(0)
+
+    _amend(core, change)
+
+
+@_exact_line({*ALL})
+def addend_of_the_other_kind(core: ExactLine) -> None:
+    """What is added is Δ, whether the follower moves or not."""
+    r = core.registers
+
+    def change(m: Module) -> None:
+        with m.If(_goes(core) & core.left[-1]):
+            m.d.sync += r["addend"].eq(r["gain"])
+
+    _amend(core, change)
+
+
+@_exact_line({*ALL})
+def total_of_the_block_before(core: ExactLine) -> None:
+    """A block's first residual is added to what the block before has left."""
+    r = core.registers
+
+    def change(m: Module) -> None:
+        with m.If(_goes(core) & ~core.left[-1]):
+            m.d.sync += r["total"].eq(r["total"])
+
+    _amend(core, change)
+
+
+@_exact_line({*ALL})
+def one_step_too_many(core: ExactLine) -> None:
+    """A leader that goes upwards makes one step more than its way is long."""
+
+    def change(m: Module) -> None:
+        m.d.sync += core.registers["more"].eq(0)
+
+    _amend(core, change)
+
+
+@_exact_line(REGISTERS)
+def equal_ways_led_by_y(core: ExactLine) -> None:
+    """Of equal ways that of y is said to lead, whichever does: the points are the same."""
+    r = core.registers
+
+    def change(m: Module) -> None:
+        with m.If(~r["chosen"] & (r["delta_x"] == r["delta_y"])):
+            m.d.sync += r["way_follow_x"].eq(1)
+
+    _amend(core, change)
+
+
+@_exact_line({*ALL})
+def first_residual_rounded_down(core: ExactLine) -> None:
+    """Half the leader's way is taken off without the carry that rounds it."""
+    r = core.registers
+
+    def change(m: Module) -> None:
+        with m.If(r["room"]):
+            m.d.sync += r["ready_rest"].eq(r["way_follow"] + (r["way_lead"] >> 1))
+
+    _amend(core, change)
+
+
+@_exact_line({*ALL})
+def block_taken_over_twice(core: ExactLine) -> None:
+    """A block that has been loaded is still prepared."""
+    r = core.registers
+
+    def change(m: Module) -> None:
+        with m.If(r["prepared"]):
+            m.d.sync += r["prepared"].eq(1)
+
+    _amend(core, change)
+
+
+@_exact_line({*ALL} - {DOCUMENTS, COMPILED})
+def way_too_long_by_one_done(core: ExactLine) -> None:
+    """A block with a way of −2^n is answered by done, not refused."""
+    r = core.registers
+
+    def change(m: Module) -> None:
+        with m.If(r["room"]):
+            m.d.sync += r["ready_fault"].eq(r["way_fault"])
+
+    _amend(core, change)
+
+
+@_exact_line({*ALL} - {DOCUMENTS, COMPILED})
+def done_before_the_last_step_is_taken(core: ExactLine) -> None:
+    """The block is done in every clock in which its last step waits."""
+    r = core.registers
+
+    def change(m: Module) -> None:
+        with m.If(r["waiting"] & r["last"]):
+            m.d.sync += r["done"].eq(1)
+
+    _amend(core, change)
+
+
+@_exact_line({*ALL} - {DOCUMENTS})
+def place_before_the_step_is_taken(core: ExactLine) -> None:
+    """P3 counts in every clock in which a step of x waits."""
+    r = core.registers
+
+    def change(m: Module) -> None:
+        with m.If(r["waiting"] & r["pulse_x"] & ~core.steps.ready):
+            m.d.sync += core.place["x"].eq(core.place["x"] + 1)
+
+    _amend(core, change)
+
+
+@_exact_line({*ALL} - {DOCUMENTS, COMPILED})
+def exact_step_lost_under_stall(core: ExactLine) -> None:
+    """A step of x that is not taken is forgotten."""
+    r = core.registers
+
+    def change(m: Module) -> None:
+        with m.If(r["waiting"] & ~core.steps.ready):
+            m.d.sync += r["pulse_x"].eq(0)
+
+    _amend(core, change)
+
+
+@_exact_line({EQUIVALENCE} | VERILOG)
+def decided_step_not_reset(core: ExactLine) -> None:
+    """A step that is decided survives a reset."""
+    fresh = Signal.like(core.registers["decided"], name="decided", reset_less=True)
+    core.registers["decided"] = fresh

@@ -13,6 +13,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
+from hashlib import sha256
 from importlib import metadata
 from itertools import pairwise
 from math import cos, hypot, pi, sin
@@ -26,6 +27,8 @@ from amaranth.lib import stream
 from amaranth.lib.wiring import In, Out
 
 from discreta import cli
+from discreta.boards.board import constraints
+from discreta.boards.catalogue import BOARDS
 from discreta.hdl.circular import Circular
 from discreta.hdl.comparison import Comparison
 from discreta.hdl.conic import Conic
@@ -36,6 +39,9 @@ from discreta.hdl.pulse import PulseUnit
 from discreta.hdl.quadrant import line_block_layout
 from discreta.hdl.verilog import verilog
 from discreta.sim import speed as speeds
+from discreta.sim.bitstream import SEEDS as BUILD_SEEDS
+from discreta.sim.bitstream import Bitstream
+from discreta.sim.fpga import SynthesisError
 from discreta.sim.groups import Group, survey_groups
 from discreta.sim.methods import METHODS
 from discreta.sim.smt import Verdict
@@ -1030,8 +1036,41 @@ BAD = {
         "Missing argument 'METHOD...': see discreta synth --help",
     ),
     "an FPGA": (
-        ["synth", "linear", "--device", "hx1k"],
-        "Invalid value for '--device': 'hx1k' is not one of 'hx8k', 'up5k', 'ecp5-25k', 'gw1n-9'",
+        ["synth", "linear", "--device", "hx4k"],
+        "Invalid value for '--device': 'hx4k' is not one of 'hx8k', 'hx1k', 'up5k', 'ecp5-25k', "
+        "'gw1n-9'",
+    ),
+    "a board": (
+        ["boards", "nano"],
+        f"Invalid value for '[BOARD]': there is no board 'nano': choose {' or '.join(BOARDS)}",
+    ),
+    "a board to build for": (
+        ["build", "nano"],
+        f"Invalid value for 'BOARD': there is no board 'nano': choose {' or '.join(BOARDS)}",
+    ),
+    "no board to build for": (
+        ["build"],
+        "Missing argument 'BOARD': see discreta build --help",
+    ),
+    "seed 0": (
+        ["build", "icebreaker", "--seed", "0"],
+        "Invalid value for '--seed': seed is 0: choose a whole number from 1 to 2147483647",
+    ),
+    "seed x": (
+        ["build", "icebreaker", "--seed", "x"],
+        "Invalid value for '--seed': seed is 'x': choose a whole number from 1 to 2147483647",
+    ),
+    "seed of a project": (
+        ["build", "arty-a7", "--seed", "1"],
+        "arty-a7 is not built here: leave out --seed and --json",
+    ),
+    "bits in a missing folder": (
+        ["build", "icebreaker", "--output", "no/top.bin"],
+        "cannot write no/top.bin: there is no folder no; make it first",
+    ),
+    "a project in a missing folder": (
+        ["build", "arty-a7", "--output", "no/arty"],
+        "cannot write no/arty: No such file or directory",
     ),
     "axes of synthesised arcs": (
         ["synth", "linear", "circular", "--axes", "3"],
@@ -1708,6 +1747,149 @@ def test_synthesis_of_what_has_no_room(discreta):
     assert out.splitlines()[3].split()[-5:] == ["14", "-", "-", "-", "-"]
     read = json.loads(Path("s.json").read_text())
     assert [core["problem"] for core in read["cores"]] == ["", "no room for p1", ""]
+
+
+# --- boards
+
+
+def test_boards(discreta):
+    code, out, err = discreta("boards")
+    assert (code, err) == (0, "")
+    rows = [line.split()[0] for line in out.splitlines()]
+    assert rows == ["board", *BOARDS]
+    assert "iCEBreaker (Lattice iCE40 UP5K)" in out
+
+
+@pytest.mark.parametrize("name", BOARDS)
+def test_pins_of_a_board(discreta, name):
+    board = BOARDS[name]
+    code, out, err = discreta("boards", name)
+    assert (code, err) == (0, "")
+    title, head, *rows = out.splitlines()
+    assert title == f"{board.title}, serial link at 115200 baud"
+    assert re.split(r"  +", head)[:4] == ["port", "is", "on the board", "pin of the FPGA"]
+    assert [re.split(r"  +", row) for row in rows] == [list(pin.row()) for pin in board.pins]
+
+
+MADE = Bitstream(
+    bits=b"\x7e\xaa",
+    seed=2,
+    used={"logic cells": 10, "multipliers": 0},
+    available={"logic cells": 40, "multipliers": 0},
+    fmax=15.0,
+    clock=12.0,
+)
+
+
+class Asked(list):
+    """What was asked for, and what it gives."""
+
+    result: Bitstream | Exception = MADE
+
+
+@pytest.fixture
+def built(monkeypatch):
+    """Build nothing: give what is there, or raise it."""
+    asked = Asked()
+
+    def build(top, ports, fpga, text, clock, seeds, *, progress):
+        Fragment.get(top, None)  # else Amaranth complains that it is not used
+        assert {port.name for port in ports} == {pin.port for pin in top.board.pins}
+        asked.append((top.board.name, top.normally_closed, fpga, text, clock, seeds))
+        for _ in range(4):
+            progress()
+        if isinstance(asked.result, Exception):
+            raise asked.result
+        return asked.result
+
+    monkeypatch.setattr(cli, "build", build)
+    monkeypatch.setattr(cli, "check_tools", lambda *_, **__: None)
+    return asked
+
+
+def test_build(discreta, built, folder):
+    code, out, err = discreta("build", "icebreaker")
+    assert (code, err) == (0, "")
+    pins = constraints(BOARDS["icebreaker"], "pcf")
+    assert built == [("icebreaker", False, "up5k", pins, 12, BUILD_SEEDS)]
+    digest = sha256(MADE.bits).hexdigest()
+    title, *rows = (" ".join(line.split()) for line in out.splitlines())
+    assert title == "iCEBreaker (Lattice iCE40 UP5K): lines and arcs of 16 bits"
+    assert rows == [
+        "used there %",
+        "logic cells 10 40 25",
+        "multipliers 0 0 -",
+        "clock 12 MHz, 15.00 reached: margin 25 %, seed 2",
+        f"icebreaker.bin: 2 bytes, sha256 {digest}",
+        "load it: iceprog icebreaker.bin",
+    ]
+    assert snapshot(folder) == {"icebreaker.bin": MADE.bits}
+
+
+def test_build_with_all_its_options(discreta, built, folder):
+    options = ("--seed", "7", "--normally-closed", "--output", "my.fs", "--json", "-")
+    code, out, err = discreta("build", "tangnano9k", *options)
+    assert code == 0
+    assert built[0][:3] == ("tangnano9k", True, "gw1n-9")
+    assert built[0][-1] == (7,)
+    assert err.splitlines()[-1] == "load it: openFPGALoader --board tangnano9k my.fs"
+    assert json.loads(out) == {
+        "board": "tangnano9k",
+        "draws": "lines and arcs of 16 bits",
+        "seed": 2,
+        "clock": 12.0,
+        "fastest": 15.0,
+        "margin": 25.0,
+        "used": MADE.used,
+        "available": MADE.available,
+        "bytes": 2,
+        "sha256": sha256(MADE.bits).hexdigest(),
+    }
+    assert snapshot(folder) == {"my.fs": MADE.bits}
+
+
+def test_no_bits_below_the_clock(discreta, built, folder):
+    Path("icebreaker.bin").write_bytes(b"before")
+    said = "it does not reach its clock of 12 MHz: 11.90 MHz with seed 1"
+    built.result = SynthesisError(said)
+    code, out, err = discreta("build", "icebreaker", "--json", "b.json")
+    assert (code, out, err) == (1, "", f"discreta: icebreaker: {said}\n")
+    assert snapshot(folder) == {"icebreaker.bin": b"before"}
+
+
+def test_without_its_tools_a_build_says_what_it_needs(discreta, monkeypatch, folder):
+    for name, board in (("pyosys", "icebreaker"), ("apycula", "tangnano9k")):
+        monkeypatch.setitem(sys.modules, "pyosys", sys)  # it is there, at least
+        monkeypatch.setitem(sys.modules, name, None)
+        message = f"a build needs {name}: install the extra, pip install 'discreta[boards]'"
+        assert discreta("build", board) == (2, "", f"discreta: {message}\n")
+        assert snapshot(folder) == {}
+
+
+def test_a_project(discreta, folder):
+    said = (
+        "Arty A7-35T (Xilinx Artix-7) is not built here: {} has a project for Vivado, "
+        "vivado -mode batch -source build.tcl\n"
+    )
+    assert discreta("build", "arty-a7") == (0, said.format("arty-a7"), "")
+    written = snapshot(folder)
+    assert {*written} == {f"arty-a7{name}" for name in ("", "/top.v", "/top.xdc", "/build.tcl")}
+    assert written["arty-a7/top.xdc"] == constraints(BOARDS["arty-a7"], "xdc").encode()
+    assert discreta("build", "arty-a7", "--output", "again") == (0, said.format("again"), "")
+    assert snapshot(folder / "again") == snapshot(folder / "arty-a7")
+    # Over the files that are there; another switch is another Verilog.
+    assert discreta("build", "arty-a7", "--normally-closed")[0] == 0
+    after = snapshot(folder)
+    assert after["arty-a7/top.v"] != written["arty-a7/top.v"]
+    assert after["arty-a7/top.xdc"] == written["arty-a7/top.xdc"]
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_project_where_a_file_is(discreta):
+    Path("arty-a7").write_text("mine")
+    message = "discreta: cannot write arty-a7: File exists\n"
+    assert discreta("build", "arty-a7") == (2, "", message)
+    assert Path("arty-a7").read_text() == "mine"
 
 
 # --- the machine it runs on

@@ -9,13 +9,14 @@ E = Δ·(k + 1) − L·(y + ½) of its next step, rounded, with the sign of Δ: 
 sign of Δ, then E grows by ``loss`` = Δ ∓ L, else by ``gain`` = Δ. One of the two decisions comes
 more often, that of the first step (``often``), with E of the sign ``first``; the other one never
 twice in a row. So the registers are one step ahead: ``total`` is what E becomes if this step is one
-of the frequent kind, ``addend`` what the kind it is adds. In the plane only the axis that does not
-lead has them; with more axes every one has, behind its letter.
+of the frequent kind, ``addend`` what the kind it is adds; ``rest`` brings the first E. In the plane
+only the axis that does not lead has them; with more axes every one has, behind its letter.
 
 A block goes from ``start_``, ``delta_`` (``pending``, then ``weighed``) through, in the plane,
-``way_`` (``chosen``), to ``ready_`` (``prepared``), and is then ``loaded``, ``starting`` and
-``running``. A step that waits for its taker is in ``pulse_`` and ``direction_``. P3, P4 hold the
-position, P5 the steps left of the leading axis, less three.
+``way_`` (``chosen``), to ``ready_`` (``prepared``; there is ``room`` for it when none is held), and
+is then ``loaded``, ``starting`` and ``running``. A step is ``decided`` (``moves_``, ``falls_``) and
+then waits for its taker in ``pulse_`` and ``down_``. P3, P4 hold the position, ``move_`` what is
+added to it next, or its new start. P5 counts the steps up to 0, the last one, and rests at 1.
 """
 
 from collections.abc import Callable
@@ -74,22 +75,15 @@ class ExactLine:
             kinds |= {f"start_{a}": wide, f"delta_{a}": wide, f"beyond_{a}": bit}
             kinds |= {f"ready_start_{a}": wide, f"ready_negative_{a}": bit}
             kinds |= {f"begin_{a}": wide, f"negative_{a}": bit}
+            kinds |= {f"move_{a}": wide, f"moves_{a}": bit, f"falls_{a}": bit}
         for f in self.followers:
             kinds |= dict.fromkeys((f"gain{f}", f"loss{f}", f"total{f}", f"addend{f}"), wide)
+            kinds[f"rest{f}"] = wide
             kinds |= dict.fromkeys((f"often{f}", f"first{f}", f"rare{f}"), bit)
             kinds |= dict.fromkeys((f"ready_gain{f}", f"ready_loss{f}", f"ready_rest{f}"), wide)
-        flags = ("open", "pending", "weighed", "prepared", "refused", "ready_fault")
-        flags += (
-            "one",
-            "idle",
-            "loaded",
-            "starting",
-            "running",
-            "waiting",
-            "last",
-            "done",
-            "error",
-        )
+        flags = ("open", "pending", "weighed", "room", "prepared", "refused", "ready_fault")
+        flags += ("works", "loaded", "starting", "running", "decided", "final")
+        flags += ("waiting", "last", "done", "error")
         kinds |= dict.fromkeys(flags, bit)
         if self.axes == 2:
             kinds |= {"way_lead": wide, "way_follow": wide, "ready_lead": wide}
@@ -97,6 +91,7 @@ class ExactLine:
             kinds |= {f"way_negative_{a}": bit for a in self.letters}
             flags = ("chosen", "sum_down", "difference_down", "way_follow_x", "way_same")
             flags += ("way_fault", "ready_follow_x", "follow_x", "follows_x")
+            flags += ("bare_x", "bare_y", "way_bare", "more")
             kinds |= dict.fromkeys(flags, bit)
         else:
             kinds |= {"axis": (3, False), "reach": (self.width + 1, False)}
@@ -105,12 +100,12 @@ class ExactLine:
 
     def reset(self) -> State:
         """Give the state after reset."""
-        return dict.fromkeys(self.registers(), 0) | dict.fromkeys(("open", "idle", "one"), 1)
+        return dict.fromkeys(self.registers(), 0) | dict.fromkeys(("open", "room", self.left), 1)
 
     def outputs(self, state: State) -> dict[str, Value]:
         """Give what the ports show in a state."""
-        busy = negate(state["idle"])
-        stages = ("pending", "prepared", "refused", "waiting")
+        busy = state["works"]
+        stages = ("pending", "prepared", "refused", "decided", "waiting")
         for name in (*stages, *(("chosen",) if self.axes == 2 else ())):
             busy = busy | state[name]
         out = {
@@ -132,13 +127,14 @@ class ExactLine:
         ``inputs``: ``blocks_valid``, ``blocks_start_x``…, ``blocks_end_x``…, ``steps_ready``.
         """
         ready, waiting = inputs["steps_ready"], state["waiting"]
-        # The next block is loaded when the last step of the one before begins to wait.
+        # The next block is loaded when the last step of the one before is decided.
         go = negate(waiting) | ready
-        ends = state["running"] & less(state[self.left], 0)
+        rests = negate(less(state[self.left], 0))
+        ends = state["running"] & rests
         goes_on = state["loaded"] | (state["running"] & negate(ends))
-        load = state["prepared"] & (state["idle"] | ends)
-        answer = state["refused"] & state["idle"] & negate(waiting)
-        room = negate(state["prepared"]) & negate(state["refused"])
+        load = state["prepared"] & rests
+        answer = state["refused"] & negate(state["works"] | state["decided"] | waiting)
+        room = state["room"]
 
         leaves = self._leaves(state) if self.axes == 2 else state["weighed"] & room
         after = self._accepted(state, inputs, leaves, room)
@@ -148,37 +144,44 @@ class ExactLine:
         else:
             after |= self._weighed(state, leaves)
             takes = leaves
-        after |= self._prepared(state, takes)
-        after["prepared"] = where(takes, after["prepared"], state["prepared"] & negate(load & go))
-        after["refused"] = where(takes, after["refused"], state["refused"] & negate(answer))
+        values = self._prepared(state)
+        refused = values.pop("refused")
+        after |= {name: where(room, value, state[name]) for name, value in values.items()}
+        after["prepared"] = (takes & negate(refused)) | (state["prepared"] & negate(load & go))
+        after["refused"] = (takes & refused) | (state["refused"] & negate(answer))
+        after["room"] = negate(after["prepared"] | after["refused"])
 
         def goes(name: str, value: Value) -> None:
             """A register that stands still while a step waits."""
             after[name] = where(go, value, state[name])
 
-        goes("idle", negate(load | goes_on))
+        goes("works", load | goes_on)
         goes("loaded", load)
         goes("starting", state["loaded"])
         goes("running", goes_on)
-        goes("waiting", state["running"])
-        goes("last", ends)
+        goes("decided", state["running"])
+        goes("final", ends)
+        goes("waiting", state["decided"])
+        goes("last", state["final"])
         after["done"] = (waiting & ready & state["last"]) | (answer & negate(state["ready_fault"]))
         after["error"] = answer & state["ready_fault"]
         carried = {f"negative_{a}": f"ready_negative_{a}" for a in self.letters}
         carried |= {f"begin_{a}": f"ready_start_{a}" for a in self.letters}
         carried |= {"follow_x": "ready_follow_x"} if self.axes == 2 else {}
         for own, prepared in carried.items():
-            goes(own, where(load, state[prepared], state[own]))
+            # Without a block prepared it is not looked at.
+            goes(own, where(rests, state[prepared], state[own]))
 
-        # Steps left: two are taken off when the block starts, as p5 is negative from the last
-        # step on.
+        # 1 when a block is loaded: what that makes of it then is no sum.
         count, down = self._count(state)
-        fewer = self._wrap(state[self.left] - where(state["one"], 1, 2))
-        goes(self.left, where(load, count, fewer))
-        goes("one", negate(load) | down)
+        more = state["more"] if self.axes == 2 else state["loaded"]
+        counted = self._wrap(state[self.left] + state["works"] + more)
+        goes(self.left, counted ^ where(load, count ^ 1, 0))
+        if self.axes == 2:
+            goes("more", load & negate(down))
         moves = {}
         for f in self.followers:
-            moves[f] = self._follow(state, f, load, goes)
+            moves[f] = self._follow(state, f, rests, goes)
         for a in self.letters:
             if self.axes == 2:
                 follows = state["follows_x"] if a == "x" else negate(state["follows_x"])
@@ -187,38 +190,44 @@ class ExactLine:
                 pulse = moves[f"_{a}"]
             pulse = state["running"] & pulse
             direction = state[f"direction_{a}"]
-            goes(f"pulse_{a}", pulse)
-            goes(f"down_{a}", pulse & direction)
+            goes(f"moves_{a}", pulse)
+            goes(f"falls_{a}", pulse & direction)
+            goes(f"pulse_{a}", state[f"moves_{a}"])
+            goes(f"down_{a}", state[f"falls_{a}"])
             goes(f"direction_{a}", where(state["loaded"], state[f"negative_{a}"], direction))
             # A step that waits is taken; where none does it is 0.
-            moved = self._wrap(state[self.place(a)] + self._step(state, a))
-            goes(self.place(a), where(state["loaded"], state[f"begin_{a}"], moved))
+            move, step = state[f"move_{a}"], state[f"moves_{a}"] - 2 * state[f"falls_{a}"]
+            goes(f"move_{a}", where(state["loaded"], state[f"begin_{a}"], step))
+            moved = self._wrap(state[self.place(a)] + move)
+            goes(self.place(a), where(state["starting"], move, moved))
         if self.axes == 2:
             follows = where(state["loaded"], state["follow_x"], state["follows_x"])
             goes("follows_x", follows)
         return after
 
-    def _follow(self, state: State, f: str, load: Value, goes: Goes) -> Value:
-        """Go on with a follower, and tell whether it moves with the step that begins to wait."""
+    def _follow(self, state: State, f: str, rests: Value, goes: Goes) -> Value:
+        """Go on with a follower, and tell whether it moves with the step that is decided."""
         own = {
             name: state[name + f]
             for name in ("gain", "loss", "total", "addend", "often", "first", "rare")
         }
         rest = state[f"ready_rest{f}"]
-        # The rare decision: the sign is another one than at first. It never comes twice in a row.
-        settled = negate(state["loaded"]) & negate(state["starting"])
-        rare = negate(own["rare"]) & settled & (less(own["total"], 0) ^ own["first"])
+        # The rare decision: the sign is another one than at first. It never comes twice in a row,
+        # nor before the second step.
+        rare = negate(own["rare"]) & (less(own["total"], 0) ^ own["first"])
         moves = rare ^ own["often"]
         chosen = where(moves, own["loss"], own["gain"])
-        # A block's first residual goes through the addend into an empty total.
-        goes(f"addend{f}", where(load, rest, chosen))
-        goes(f"total{f}", where(load, 0, self._wrap(own["total"] + own["addend"])))
-        goes(f"rare{f}", rare)
+        # A block's first residual comes to a total and an addend of 0.
+        total = self._wrap(own["total"] + own["addend"]) ^ state[f"rest{f}"]
+        goes(f"addend{f}", where(rests, 0, chosen))
+        goes(f"total{f}", where(rests, 0, total))
+        goes(f"rest{f}", where(rests, rest, 0))
+        goes(f"rare{f}", rare | rests | state["loaded"])
         upwards = negate(less(state[f"ready_gain{f}"], 0))
-        goes(f"often{f}", where(load, less(rest, 0) ^ upwards, own["often"]))
-        goes(f"first{f}", where(load, less(rest, 0), own["first"]))
-        goes(f"gain{f}", where(load, state[f"ready_gain{f}"], own["gain"]))
-        goes(f"loss{f}", where(load, state[f"ready_loss{f}"], own["loss"]))
+        goes(f"often{f}", where(rests, less(rest, 0) ^ upwards, own["often"]))
+        goes(f"first{f}", where(rests, less(rest, 0), own["first"]))
+        goes(f"gain{f}", where(rests, state[f"ready_gain{f}"], own["gain"]))
+        goes(f"loss{f}", where(rests, state[f"ready_loss{f}"], own["loss"]))
         return moves
 
     def _accepted(
@@ -245,6 +254,9 @@ class ExactLine:
             x, y = state["delta_x"], state["delta_y"]
             after |= {"sum_down": less(x + y, 0), "difference_down": less(x - y, 0)}
             after["weighed"] = stays
+            for a in "xy":
+                # All bits but the sign are 0: no way, or one too long.
+                after[f"bare_{a}"] = equal(state[f"delta_{a}"] & (2**self.width - 1), 0)
         return after
 
     def _weighed(self, state: State, leaves: Value) -> State:
@@ -277,26 +289,28 @@ class ExactLine:
             "way_follow_x": follow_x,
             "way_same": same,
             "way_fault": self._too_long(state),
+            "way_bare": where(follow_x, state["bare_y"], state["bare_x"]),
         }
         for a in self.letters:
             values[f"way_start_{a}"] = state[f"start_{a}"]
             values[f"way_negative_{a}"] = less(state[f"delta_{a}"], 0)
-        takes = self._leaves(state)
-        after = {name: where(takes, value, state[name]) for name, value in values.items()}
-        after["chosen"] = takes | (state["chosen"] & negate(room))
+        empty = negate(state["chosen"])
+        after = {name: where(empty, value, state[name]) for name, value in values.items()}
+        after["chosen"] = self._leaves(state) | (state["chosen"] & negate(room))
         return after
 
-    def _prepared(self, state: State, takes: Value) -> State:
-        """Work out the two addends and the first residual of every follower."""
+    def _prepared(self, state: State) -> State:
+        """Work out the two addends and the first residual of every follower; tell of a fault."""
         values: dict[str, Value] = {}
         if self.axes == 2:
             same = state["way_same"]
-            lead = where(same, -1 - state["way_lead"], state["way_lead"])
             against = state["way_lead"] + same
-            length = self._length(lead)
             ways = {"": (state["way_follow"], against)}
             values |= {"ready_lead": state["way_lead"], "ready_follow_x": state["way_follow_x"]}
-            fault = state["way_fault"]
+            # No way at all, or −2^n: only the sign tells.
+            bare = state["way_bare"]
+            fault = state["way_fault"] | (bare & (less(state["way_lead"], 0) ^ same))
+            values["refused"] = fault | bare
             for a in self.letters:
                 values[f"ready_start_{a}"] = state[f"way_start_{a}"]
                 values[f"ready_negative_{a}"] = state[f"way_negative_{a}"]
@@ -309,25 +323,24 @@ class ExactLine:
                 values[f"ready_start_{a}"] = state[f"start_{a}"]
                 values[f"ready_negative_{a}"] = less(delta, 0)
             values["ready_lead"] = self._wrap(length)
-            fault = self._too_long(state)
+            fault = self._too_long(state) | negate(less(length, 2**self.width))
+            values["refused"] = fault | equal(length, 0)
         for f, (way, against) in ways.items():
             values[f"ready_gain{f}"] = way
             values[f"ready_loss{f}"] = self._wrap(way + against)
             values[f"ready_rest{f}"] = self._wrap(way + (against >> 1))
-        values["ready_fault"] = fault | negate(less(length, 2**self.width))
-        values["refused"] = values["ready_fault"] | equal(length, 0)
-        values["prepared"] = negate(values["refused"])
-        return {name: where(takes, value, state[name]) for name, value in values.items()}
+        values["ready_fault"] = fault
+        return values
 
     def _count(self, state: State) -> tuple[Value, Value]:
-        """Give what the steps left are loaded with, and whether that is 1 too small."""
+        """Give what the steps left are loaded with, and whether that is one more than usual."""
         lead = state["ready_lead"]
+        # −1 less the length; or, where the leader of the plane goes downwards, less the length.
+        count = where(less(lead, 0), lead, -1 - lead)
         if self.axes > 2:
-            return lead, 0
-        upwards = negate(less(state["ready_gain"], 0))
+            return count, 0
         x, y = (state[f"ready_negative_{a}"] for a in "xy")
-        # Turned over where the leader goes downwards, which leaves its length less 1.
-        return where(upwards, -1 - lead, lead), where(state["ready_follow_x"], y, x)
+        return count, where(state["ready_follow_x"], y, x)
 
     def _leaves(self, state: State) -> Value:
         """Tell whether the block of the plane that came last leaves its place."""

@@ -113,7 +113,7 @@ class _Clock:
             for name in ("steps_valid", "steps_last", *(f"steps_{a}" for a in golden.letters))
         }
         blocks = after["timer_here"] + after["timer_next"]
-        plane = golden.letters[: golden.core.axes] if not golden.round else "xy"
+        plane = "xy" if golden.round else golden.letters
         found = [
             Obligation("invariant: holds after reset", [], self.invariant(reset, self.target)),
             Obligation(

@@ -6,8 +6,10 @@ the promises follow. Ghost values remember what the registers forget:
 
 - ``end_``: where the block in each stage ends, by the stage's name (``in``, ``way``, ``ready``,
   ``next``: loaded or running, ``out``: with steps to be taken), and where it begins, ``begin_``;
-- of the block that runs: ``L``, the length of the leading axis; ``rest``, the first residual of a
-  follower; ``k``, the steps that have begun to wait; ``count``, those of them that move an axis;
+- of the block that runs: ``L``, the length of the leading axis; ``first``, the first residual of a
+  follower; ``k``, the steps that have been decided; ``count``, those of them that move an axis;
+- of the block with steps to be taken: ``L out``; ``k out`` and ``out``, the same of those that have
+  begun to wait;
 - ``f`` = k·Δ − count·(± L) of a follower, which is L times the way by which it is beside the line.
 
 What that amounts to in numbers is shown of integers.
@@ -52,10 +54,10 @@ class _Clock:
             for p in ("begin", "end")
             for a in self.letters
         }
-        ghosts |= {"L": (n + 1, False), "k": (n + 1, False)}
-        ghosts |= {f"rest{f}": coordinate for f in self.followers}
+        ghosts |= dict.fromkeys(("L", "k", "L out", "k out"), (n + 1, False))
+        ghosts |= {f"first{f}": coordinate for f in self.followers}
         ghosts |= {f"f{f}": (n + 3, True) for f in self.followers}
-        ghosts |= {f"count_{a}": (n + 1, False) for a in self.letters}
+        ghosts |= {f"{k}_{a}": (n + 1, False) for a in self.letters for k in ("count", "out")}
         named = symbols({f"ghost.{name}": kind for name, kind in ghosts.items()}, wide)
         self.ghosts = {name.removeprefix("ghost."): value for name, value in named.items()}
 
@@ -67,10 +69,13 @@ class _Clock:
         self.taken = z3.And(self.waiting, self.inputs["steps_ready"] == 1)
         self.go = z3.Or(z3.Not(self.waiting), self.taken)
         self.accept = z3.And(self.inputs["blocks_valid"] == 1, self.out["blocks_ready"] == 1)
-        self.ends = z3.And(state["running"] == 1, state[golden.left] < 0)
-        self.load = z3.And(state["prepared"] == 1, z3.Or(state["idle"] == 1, self.ends), self.go)
-        self.answer = z3.And(state["refused"] == 1, state["idle"] == 1, z3.Not(self.waiting))
+        self.ends = z3.And(state["running"] == 1, state[golden.left] >= 0)
+        idle = z3.And([state[name] == 0 for name in ("works", "decided", "waiting")])
+        self.load = z3.And(state["prepared"] == 1, z3.Or(state["works"] == 0, self.ends), self.go)
+        self.answer = z3.And(state["refused"] == 1, idle)
         self.begins = z3.And(state["loaded"] == 1, self.go)
+        self.places = z3.And(state["starting"] == 1, self.go)
+        self.counts = z3.And(state["decided"] == 1, self.go)
         self.enters = z3.And(state["running"] == 1, self.go)
         self.ghosts_after = self.remembered()
 
@@ -95,11 +100,11 @@ class _Clock:
         return {f"_{a}": self.delta(ghosts, stage, a) for a in self.letters}
 
     def moved(self) -> dict[str, z3.BoolRef]:
-        """Tell which axes the step moves that begins to wait."""
-        return {a: self.after[f"pulse_{a}"] == 1 for a in self.letters}
+        """Tell which axes the step moves that is decided."""
+        return {a: self.after[f"moves_{a}"] == 1 for a in self.letters}
 
     def steps(self) -> dict[str, z3.BoolRef]:
-        """Tell which followers the step moves that begins to wait."""
+        """Tell which followers the step moves that is decided."""
         moved = self.moved()
         if self.golden.axes == 2:
             return {"": z3.If(self.state["follows_x"] == 1, moved["x"], moved["y"])}
@@ -114,7 +119,7 @@ class _Clock:
         state, ghosts = self.state, self.ghosts
         plane = self.golden.axes == 2
         leaves = z3.And(state["weighed"] == 1, state["chosen"] == 0) if plane else False
-        room = z3.And(state["prepared"] == 0, state["refused"] == 0)
+        room = state["room"] == 1
         takes = z3.And((state["chosen"] if plane else state["weighed"]) == 1, room)
         after: dict[str, Value] = {}
         for a in self.letters:
@@ -126,13 +131,12 @@ class _Clock:
                     f"{p}_way_{a}": z3.If(leaves, at["in"], at["way"]),
                     f"{p}_ready_{a}": z3.If(takes, at["way" if plane else "in"], at["ready"]),
                     f"{p}_next_{a}": z3.If(self.load, at["ready"], at["next"]),
-                    f"{p}_out_{a}": z3.If(self.begins, at["next"], at["out"]),
+                    f"{p}_out_{a}": z3.If(self.places, at["next"], at["out"]),
                 }
-        longest = z3.BitVecVal(0, self.wide)
-        for a in self.letters:
-            length = _magnitude(self.delta(ghosts, "ready", a))
-            longest = z3.If(length > longest, length, longest)
-        after["L"] = z3.If(self.load, longest, ghosts["L"])
+        after["L"] = z3.If(self.load, self.length(ghosts, "ready"), ghosts["L"])
+        after["L out"] = z3.If(self.places, ghosts["L"], ghosts["L out"])
+        more = z3.If(self.counts, ghosts["k out"] + 1, ghosts["k out"])
+        after["k out"] = z3.If(self.places, 0, more)
         after["k"] = z3.If(self.begins, 0, z3.If(self.enters, ghosts["k"] + 1, ghosts["k"]))
         moved = self.moved()
         for a in self.letters:
@@ -140,8 +144,10 @@ class _Clock:
                 z3.And(self.enters, moved[a]), ghosts[f"count_{a}"] + 1, ghosts[f"count_{a}"]
             )
             after[f"count_{a}"] = z3.If(self.begins, 0, more)
+            more = z3.If(self.counts, state[f"moves_{a}"], z3.BitVecVal(0, self.wide))
+            after[f"out_{a}"] = z3.If(self.places, 0, ghosts[f"out_{a}"] + more)
         for f in self.followers:
-            after[f"rest{f}"] = z3.If(self.load, state[f"ready_rest{f}"], ghosts[f"rest{f}"])
+            after[f"first{f}"] = z3.If(self.load, state[f"ready_rest{f}"], ghosts[f"first{f}"])
             grown = ghosts[f"f{f}"] + self.added(f)
             after[f"f{f}"] = z3.If(self.begins, 0, z3.If(self.enters, grown, ghosts[f"f{f}"]))
         return after
@@ -149,16 +155,24 @@ class _Clock:
     def working(self, state: dict) -> dict[str, z3.BoolRef]:
         """Give what is true of the flags that say what goes on."""
         runs = z3.Or(state["loaded"] == 1, state["running"] == 1)
-        waiting, running, starting = (state[name] for name in ("waiting", "running", "starting"))
+        running, starting, decided = (state[name] for name in ("running", "starting", "decided"))
+        more = state["more"] if self.golden.axes == 2 else state["loaded"]
+        left = state[self.golden.left]
         return {
             "one at a time": z3.And(
-                (state["idle"] == 0) == runs,
+                (state["works"] == 1) == runs,
                 z3.Or(state["loaded"] == 0, running == 0),
-                z3.Implies(starting == 1, running == 1),
+                z3.Implies(starting == 1, z3.And(running == 1, decided == 0)),
                 z3.Or(state["prepared"] == 0, state["refused"] == 0),
+                (state["room"] == 1) == z3.And(state["prepared"] == 0, state["refused"] == 0),
             ),
-            "one": z3.Implies(state["loaded"] == 0, state["one"] == 1),
-            "a step waits": z3.Implies(running == 1, waiting + starting == 1),
+            "more": z3.Implies(state["loaded"] == 0, more == 0),
+            "rests": z3.And(
+                z3.Implies(z3.Not(runs), left == 1),
+                z3.Implies(running == 1, left <= 0),
+                z3.Implies(state["loaded"] == 1, left + more < 0),
+            ),
+            "a step is decided": z3.Implies(running == 1, decided + starting == 1),
         }
 
     def groups(self, state: dict, ghosts: dict) -> dict[str, dict[str, z3.BoolRef]]:
@@ -226,6 +240,10 @@ class _Clock:
             z3.And(
                 (state["sum_down"] == 1) == (x + y < 0),
                 (state["difference_down"] == 1) == (x - y < 0),
+                *(
+                    (state[f"bare_{a}"] == 1) == z3.Or(way == 0, way == -self.top)
+                    for a, way in (("x", x), ("y", y))
+                ),
             ),
         )
         facts["open"] = z3.Implies(
@@ -244,6 +262,7 @@ class _Clock:
                 state["way_follow"] == follow,
                 (state["way_same"] == 1) == alike,
                 state["way_lead"] == z3.If(alike, -1 - lead, lead),
+                (state["way_bare"] == 1) == z3.Or(lead == 0, lead == -self.top),
                 _magnitude(follow) <= _magnitude(lead),
                 *(
                     (state[f"way_negative_{a}"] == 1) == (self.delta(ghosts, "way", a) < 0)
@@ -288,7 +307,10 @@ class _Clock:
                     (state[f"ready_negative_{a}"] == 1) == (delta < 0),
                 ),
             )
-        length = self.length(ghosts, "ready", follow_x)
+        # In the plane that of the leader: ``shorter way`` says that it is the longest.
+        plane = self.golden.axes == 2
+        lead = self.leader(ghosts, "ready", follow_x)[0] if plane else None
+        length = _magnitude(lead) if plane else self.length(ghosts, "ready")
         for f, way in self.ways(ghosts, "ready", follow_x).items():
             against = -_signed(way, length)
             facts |= {
@@ -311,10 +333,8 @@ class _Clock:
             facts["leader"] = z3.Implies(ready, state["ready_lead"] == length)
         return facts
 
-    def length(self, ghosts: dict, stage: str, follow_x: Value) -> Value:
+    def length(self, ghosts: dict, stage: str) -> Value:
         """Give how long the way of the leading axis is."""
-        if self.golden.axes == 2:
-            return _magnitude(self.leader(ghosts, stage, follow_x)[0])
         longest = z3.BitVecVal(0, self.wide)
         for a in self.letters:
             length = _magnitude(self.delta(ghosts, stage, a))
@@ -336,19 +356,15 @@ class _Clock:
                 z3.And(
                     length >= 1,
                     length < self.top,
-                    length == self.length(ghosts, "next", follow_x),
+                    length == self.length(ghosts, "next"),
                 ),
             ),
             "steps left": z3.And(
-                z3.Implies(
-                    loaded,
-                    left - z3.If(state["one"] == 1, z3.BitVecVal(1, self.wide), 2) == length - 2,
-                ),
-                z3.Implies(running, left == length - 2 - ghosts["k"]),
+                z3.Implies(loaded, left + (state["more"] if plane else 1) == -length),
+                z3.Implies(running, left == ghosts["k"] + 1 - length),
                 z3.Implies(running, ghosts["k"] < length),
                 z3.Implies(starting, ghosts["k"] == 0),
                 z3.Implies(z3.And(running, z3.Not(starting)), ghosts["k"] >= 1),
-                z3.Implies(running, state["waiting"] == z3.If(starting, 0, state["waiting"])),
             ),
         }
         for a in self.letters:
@@ -360,7 +376,7 @@ class _Clock:
                 ),
             )
             facts[f"runs {a}"] = z3.Implies(
-                running,
+                z3.And(running, z3.Not(starting)),
                 z3.And(
                     ghosts[f"begin_out_{a}"] == ghosts[f"begin_next_{a}"],
                     ghosts[f"end_out_{a}"] == ghosts[f"end_next_{a}"],
@@ -383,10 +399,10 @@ class _Clock:
         for f in self.followers:
             own = {
                 name: state[name + f]
-                for name in ("gain", "loss", "total", "addend", "often", "first", "rare")
+                for name in ("gain", "loss", "total", "addend", "rest", "often", "first", "rare")
             }
             way = own["gain"]
-            rest, beside = ghosts[f"rest{f}"], ghosts[f"f{f}"]
+            rest, beside = ghosts[f"first{f}"], ghosts[f"f{f}"]
             frequent = z3.If(own["often"] == 1, own["loss"], own["gain"])
             rare = z3.If(own["often"] == 1, own["gain"], own["loss"])
             up = way >= 0
@@ -403,11 +419,16 @@ class _Clock:
             )
             facts["length of the block"] = z3.Implies(there, z3.And(length >= 1, length < self.top))
             facts |= {
-                f"loaded{f}": z3.Implies(loaded, z3.And(own["addend"] == rest, own["total"] == 0)),
+                f"loaded{f}": z3.Implies(
+                    loaded,
+                    z3.And(*(own["rest"] == rest, own["addend"] == 0, own["total"] == 0)),
+                ),
+                f"no rest{f}": z3.Implies(running, own["rest"] == 0),
+                f"rare{f}": z3.Implies(loaded, own["rare"] == 1),
                 f"starting{f}": z3.Implies(
                     starting,
                     z3.And(
-                        *(own["total"] == rest, own["addend"] == frequent, own["rare"] == 0),
+                        *(own["total"] == rest, own["addend"] == frequent, own["rare"] == 1),
                         beside == 0,
                     ),
                 ),
@@ -435,49 +456,77 @@ class _Clock:
         return facts
 
     def waits(self, state: dict, ghosts: dict) -> dict[str, z3.BoolRef]:
-        """Give what is true of the position and of the steps that wait."""
-        waiting, running = state["waiting"] == 1, state["running"] == 1
-        there = z3.Or(waiting, running)
-        length = self.length(ghosts, "out", state["follows_x"] if self.golden.axes == 2 else None)
+        """Give what is true of the position and of the steps decided and those that wait."""
+        names = ("waiting", "decided", "running", "starting")
+        waiting, decided, running, starting = (state[name] == 1 for name in names)
+        going = z3.And(running, z3.Not(starting))
+        there = z3.Or(waiting, decided, going)
+        steps, length = ghosts["k out"], ghosts["L out"]
         facts = {
             "last": z3.Implies(
                 waiting,
                 z3.And(
-                    (state["last"] == 1) == z3.Not(running),
-                    z3.Implies(state["last"] == 1, ghosts["k"] == length),
-                    ghosts["k"] >= 1,
-                    state["starting"] == 0,
+                    (state["last"] == 1) == z3.Not(decided),
+                    z3.Implies(state["last"] == 1, steps == length),
+                    steps >= 1,
                 ),
+            ),
+            "final": z3.Implies(
+                decided,
+                z3.And(
+                    (state["final"] == 1) == z3.Not(running),
+                    z3.Implies(state["final"] == 1, ghosts["k"] == length),
+                    ghosts["k"] == steps + 1,
+                    z3.Or(waiting, steps == 0),
+                ),
+            ),
+            "length out": z3.And(
+                z3.Implies(going, length == ghosts["L"]),
+                z3.Implies(there, length == self.length(ghosts, "out")),
             ),
             "nothing waits, nothing moves": z3.And(
                 [
                     z3.And(
                         z3.Implies(state["waiting"] == 0, state[f"pulse_{a}"] == 0),
-                        state[f"down_{a}"] == state[f"pulse_{a}"] & state[f"direction_{a}"],
+                        z3.Implies(state["decided"] == 0, state[f"moves_{a}"] == 0),
+                        z3.Implies(state[f"pulse_{a}"] == 0, state[f"down_{a}"] == 0),
+                        z3.Implies(state[f"moves_{a}"] == 0, state[f"falls_{a}"] == 0),
                     )
                     for a in self.letters
                 ]
             ),
         }
         for a in self.letters:
-            count = ghosts[f"count_{a}"]
+            count, out = ghosts[f"count_{a}"], ghosts[f"out_{a}"]
+            pulse, moves = state[f"pulse_{a}"], state[f"moves_{a}"]
             way = self.delta(ghosts, "out", a)
-            place = state[self.golden.place(a)]
+            place, move = state[self.golden.place(a)], state[f"move_{a}"]
             facts[f"position {a}"] = z3.Implies(
                 there,
                 z3.And(
-                    self.same_place(
-                        place, ghosts[f"begin_out_{a}"] + _signed(way, count - state[f"pulse_{a}"])
-                    ),
-                    (state[f"direction_{a}"] == 1) == (way < 0),
-                    count <= ghosts["k"],
-                    count >= state[f"pulse_{a}"],
-                    z3.Implies(state["starting"] == 1, count == 0),
+                    self.same_place(place, ghosts[f"begin_out_{a}"] + _signed(way, out - pulse)),
+                    state[f"down_{a}"] == z3.If(way < 0, pulse, 0),
+                    state[f"falls_{a}"] == z3.If(way < 0, moves, 0),
+                    out >= pulse,
+                    out <= steps,
+                    z3.Implies(decided, count == out + moves),
                 ),
+            )
+            facts[f"moves {a}"] = z3.If(
+                starting,
+                move == ghosts[f"begin_next_{a}"],
+                move == pulse - 2 * state[f"down_{a}"],
+            )
+            facts[f"direction {a}"] = z3.Implies(
+                running, (state[f"direction_{a}"] == 1) == (self.delta(ghosts, "next", a) < 0)
+            )
+            facts[f"counted {a}"] = z3.Implies(
+                running,
+                z3.And(count <= ghosts["k"], z3.Implies(starting, count == 0)),
             )
         if self.golden.axes == 2:
             leads = z3.If(state["follows_x"] == 1, ghosts["count_y"], ghosts["count_x"])
-            facts["leader's steps"] = z3.Implies(there, leads == ghosts["k"])
+            facts["leader's steps"] = z3.Implies(running, leads == ghosts["k"])
         return facts
 
     def by_cases(self, title: str, claims: dict[str, z3.BoolRef]) -> dict[str, z3.BoolRef]:
@@ -511,7 +560,7 @@ class _Clock:
         """State that the invariant survives every clock, each part by what it follows from."""
         before = self.groups(self.state, self.ghosts)
         needs = {
-            "what goes on": (),
+            "what goes on": ("the block prepared",),
             "blocks accepted": (),
             "the block prepared": ("blocks accepted",),
             "the block that runs": ("the block prepared",),
@@ -556,7 +605,8 @@ class _Clock:
             )
         own = [golden.left, *(f"{name}{f}" for f in self.followers for name in ("total", "addend"))]
         own += [golden.place(a) for a in self.letters]
-        stays = [*own, *(f"pulse_{a}" for a in self.letters), "last", "waiting", "running"]
+        stays = [*own, *(f"{k}_{a}" for a in self.letters for k in ("pulse", "moves", "move"))]
+        stays += ["last", "waiting", "final", "decided", "running"]
         return [
             Obligation("invariant: holds after reset", [], self.invariant(reset, zero)),
             *self.survival(),
@@ -577,10 +627,11 @@ class _Clock:
                 near,
             ),
             Obligation(
-                "a step a clock: while a block runs a step begins to wait in every clock in which "
-                "none waits or one is taken, and the leading axis moves with each of them",
+                "a step a clock: while a block runs a step is decided in every clock in which none "
+                "waits or one is taken, and begins to wait in the next such clock; the leading "
+                "axis moves with each of them",
                 [*known, state["running"] == 1, self.go],
-                [after["waiting"] == 1]
+                [after["decided"] == 1, z3.Implies(state["decided"] == 1, after["waiting"] == 1)]
                 + (
                     [z3.Or(list(self.moved().values()))]
                     if not plane
@@ -589,8 +640,8 @@ class _Clock:
             ),
             Obligation(
                 "between blocks: the one prepared is loaded in the clock in which the last step of "
-                "the one before begins to wait, or in any in which nothing runs, and its first "
-                "step waits two clocks later",
+                "the one before is decided, or in any in which nothing runs, and its first step is "
+                "decided two clocks later",
                 known,
                 {
                     "loaded": z3.Implies(self.load, after["loaded"] == 1),
@@ -602,11 +653,11 @@ class _Clock:
                 },
             ),
             Obligation(
-                "it always ends: every step that begins to wait leaves one less to come, and the "
-                "L-th one is the last",
+                "it always ends: every step that is decided leaves one less to come, and the L-th "
+                "one is the last",
                 entering,
                 [
-                    (after["last"] == 1) == (self.ghosts_after["k"] == ghosts["L"]),
+                    (after["final"] == 1) == (self.ghosts_after["k"] == ghosts["L"]),
                     self.ghosts_after["k"] == ghosts["k"] + 1,
                     self.ghosts_after["k"] <= ghosts["L"],
                 ],
@@ -618,7 +669,7 @@ class _Clock:
                     a: self.same_place(
                         after[golden.place(a)],
                         z3.If(
-                            self.begins,
+                            self.places,
                             ghosts[f"begin_next_{a}"],
                             state[golden.place(a)] + z3.If(self.taken, self.out[f"steps_{a}"], 0),
                         ),
@@ -663,19 +714,16 @@ class _Clock:
                 [*known, ended],
                 {
                     a: z3.Implies(
-                        z3.Not(self.begins),
+                        z3.Not(self.places),
                         self.same_place(
                             after[golden.place(a)],
                             ghosts[f"begin_out_{a}"]
-                            + _signed(self.delta(ghosts, "out", a), ghosts[f"count_{a}"]),
+                            + _signed(self.delta(ghosts, "out", a), ghosts[f"out_{a}"]),
                         ),
                     )
                     for a in self.letters
                 }
-                | {
-                    "all steps": ghosts["k"]
-                    == self.length(ghosts, "out", state["follows_x"] if plane else None)
-                },
+                | {"all steps": ghosts["k out"] == self.length(ghosts, "out")},
             ),
         ]
 

@@ -3,9 +3,11 @@
 """Constant speed: the exact cores' steps, spread over ticks; further axes along an arc."""
 
 from math import hypot
+from typing import Any
 
 import numpy as np
 import pytest
+from amaranth.hdl import Fragment
 
 from discreta.hdl.constant_speed import ConstantSpeed, constant_arc, constant_line
 from discreta.hdl.exact_arc import ExactArc
@@ -20,7 +22,7 @@ from tests.hdl.traces import golden_trace
 
 STALLS = [NO_STALLS, Stalls(1, stall=0.5, gap=0.3), Stalls(2, stall=0.9)]
 COLUMN = {name: index for index, name in enumerate(EVENT_COLUMNS)}
-MAKE = {
+MAKE: dict[str, tuple[Any, Any]] = {
     "line": (constant_line, golden_models.constant_line),
     "arc": (constant_arc, golden_models.constant_arc),
 }
@@ -190,4 +192,6 @@ def test_parameters_are_checked():
         ConstantSpeed(ExactLine(4), 3)
     with pytest.raises(ValueError, match="number of axes is 7: choose a whole number from 2 to 6"):
         constant_arc(4, 7)
-    assert constant_arc(6, 4).parameters["axes"] == 4
+    core = constant_arc(6, 4)
+    Fragment.get(core, None)  # it must be used
+    assert core.parameters["axes"] == 4

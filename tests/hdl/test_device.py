@@ -5,29 +5,59 @@
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cache
+from math import hypot
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from amaranth import Module
-from amaranth.hdl import Value
+from amaranth import Module, Signal
+from amaranth.hdl import Fragment, Value
 
 from discreta.hdl.circular import Circular
 from discreta.hdl.conic import Conic
-from discreta.hdl.device import Device
+from discreta.hdl.constant_speed import ConstantSpeed, constant_arc, constant_line
+from discreta.hdl.device import Device, exact_device
+from discreta.hdl.exact_conic import ExactConic
+from discreta.hdl.feed import PAUSES
 from discreta.hdl.linear import Linear
+from discreta.hdl.quadrant import line_block_layout
 from discreta.hdl.queue import StopReason
 from discreta.sim.compiled import CompiledModel
-from discreta.sim.golden.device import INTERPOLATORS, make_device
+from discreta.sim.golden.circular import Circular as GoldenCircular
+from discreta.sim.golden.conic import Conic as GoldenConic
+from discreta.sim.golden.constant_speed import constant_arc as golden_constant_arc
+from discreta.sim.golden.constant_speed import constant_line as golden_constant_line
 from discreta.sim.golden.device import Device as GoldenDevice
+from discreta.sim.golden.device import make_device
+from discreta.sim.golden.exact_arc import ExactArc as GoldenExactArc
+from discreta.sim.golden.exact_conic import ExactConic as GoldenExactConic
+from discreta.sim.golden.exact_line import ExactLine as GoldenExactLine
+from discreta.sim.golden.feed import FeedUnit as GoldenFeedUnit
+from discreta.sim.golden.linear import Linear as GoldenLinear
+from discreta.sim.golden.pulse import PulseUnit as GoldenPulseUnit
 from discreta.sim.interpreted import PysimModel
 from discreta.sim.stalls import NO_STALLS, Stalls
 from tests.arcs import draw_arcs
 from tests.conics import draw_conics
 from tests.hdl.parts.clocked import assert_refused
 
-PARTS: dict[str, Callable[[int], Any]] = {"line": Linear, "arc": Circular, "conic": Conic}
+Parts = dict[str, Callable[..., Any]]
+
+PARTS: Parts = {"line": constant_line, "arc": constant_arc, "conic": ExactConic}
+#: Which steps there are, in which order: whatever their pace is, it is the core's alone.
+CORES: Parts = {"line": GoldenExactLine, "arc": GoldenExactArc, "conic": GoldenExactConic}
+#: The lecture's interpolators, and one beside others.
+LECTURE: Parts = {"line": Linear, "arc": Circular, "conic": Conic}
+MIXED: Parts = {"line": Linear, "arc": constant_arc, "conic": Conic}
+GOLDEN: dict[Callable, Callable] = {
+    Linear: GoldenLinear,
+    Circular: GoldenCircular,
+    Conic: GoldenConic,
+    constant_line: golden_constant_line,
+    constant_arc: golden_constant_arc,
+    ExactConic: GoldenExactConic,
+}
 CODES = {"line": 0, "arc": 1, "conic": 2, "place": 3}
 TIMINGS = ("pulse_length", "pulse_space", "direction_setup", "direction_hold")
 #: What is set from the first clock on: 100 %, the shortest pulses.
@@ -35,22 +65,33 @@ CALM = {"override": 128, **dict.fromkeys(TIMINGS, 1)}
 
 #: What a block of one kind has besides its start and end, in the order in which blocks are drawn.
 OWN = {
-    "line": (),
-    "arc": ("center_x", "center_y", "clockwise", "full_turns"),
+    "line": ("pace",),
+    "arc": ("center_x", "center_y", "clockwise", "full_turns", "pace", "ticks"),
     "conic": (*"abcde", "clockwise", "turns"),
 }
 
 Block = tuple[str, dict[str, int]]
 
 
-def make(width: int, kinds: Collection[str], depth: int = 1, **choices: Any) -> Device:
+def make(
+    width: int, kinds: Collection[str], depth: int = 1, parts: Parts = PARTS, **choices: Any
+) -> Device:
     """Make a device with interpolators of some kinds."""
-    parts = {kind: PARTS[kind](width) for kind in kinds}
-    return Device(**parts, depth=depth, **choices)
+    return Device(**{kind: parts[kind](width) for kind in kinds}, depth=depth, **choices)
+
+
+def golden_of(parts: Parts, kinds: Collection[str], width: int, axes: int = 2) -> GoldenDevice:
+    """Make the golden model of a device with these interpolators."""
+    more = () if axes == 2 else (axes,)
+    return GoldenDevice(
+        tuple((kind, GOLDEN[parts[kind]](width, *more)) for kind in parts if kind in kinds),
+        GoldenFeedUnit(axes, PAUSES[:axes]),
+        GoldenPulseUnit(width, axes),
+    )
 
 
 def line(x: int, y: int, **others: int) -> Block:
-    """Make a line to a point."""
+    """Make a line to a point; at full speed if no pace is given."""
     return "line", {"end_x": x, "end_y": y, **others}
 
 
@@ -59,10 +100,12 @@ def place(x: int, y: int) -> Block:
     return "place", {"end_x": x, "end_y": y}
 
 
-def arc(x: int, y: int, center: tuple[int, int] = (0, 0), clockwise: int = 0) -> Block:
+def arc(
+    x: int, y: int, center: tuple[int, int] = (0, 0), clockwise: int = 0, **others: int
+) -> Block:
     """Make an arc to a point."""
     own = {"center_x": center[0], "center_y": center[1], "clockwise": clockwise}
-    return "arc", {"end_x": x, "end_y": y, **own}
+    return "arc", {"end_x": x, "end_y": y, **own, **others}
 
 
 def rows_of(fields: Collection[str], blocks: list[Block]) -> np.ndarray:
@@ -87,11 +130,46 @@ def calm(**others: int) -> list[tuple[int, str, int]]:
     return [(0, name, value) for name, value in (CALM | others).items()]
 
 
-def draw_blocks(width: int, kinds: Collection[str], count: int, seed: int) -> list[Block]:
+def draw_pace(random: np.random.Generator, width: int, kind: str, values: dict[str, int]) -> int:
+    """Draw a pace: of full speed, the right one of an arc, or any with which it ends soon."""
+    if random.random() < 0.3:
+        return 0
+    if kind == "line":
+        return int(random.integers(2 ** (width + 12)))
+    radius = hypot(*(values[f"end_{a}"] - values[f"center_{a}"] for a in "xy"))
+    factor = float(random.choice([1, random.uniform(0.25, 4)]))
+    return min(2 ** (width + 13) - 1, max(1, round(radius * factor * 2**12)))
+
+
+def draw_blocks(
+    width: int, kinds: Collection[str], count: int, seed: int, axes: int = 2
+) -> list[Block]:
     """Draw blocks of all kinds, seeded: also such of no length, refused and of no known kind.
 
     Most curves begin where a block before them leads to; where one was refused they are refused.
+    With three axes z goes to and fro, and an arc's ``ticks`` are anything.
     """
+    more = np.random.default_rng([seed, width, axes])
+    blocks, z = [], 0
+    for kind, values in draw_plane(width, kinds, count, seed):
+        if "arc" in kinds and blocks and more.random() < 0.02:
+            # From its own centre no arc leads anywhere.
+            x, y = (blocks[-1][1][f"end_{a}"] for a in "xy")
+            blocks.append(arc(x + (3 if x < 0 else -3), y, (x, y)))
+        values = dict(values)
+        if kind in ("line", "arc") and kind in kinds:
+            values["pace"] = draw_pace(more, width, kind, values)
+        if axes > 2:
+            z = int(np.clip(z + more.integers(-9, 9, endpoint=True), -(2**width), 2**width - 1))
+            values["end_z"] = z
+            if kind == "arc" and kind in kinds:
+                values["ticks"] = int(more.integers(1, 60))
+        blocks.append((kind, values))
+    return blocks
+
+
+def draw_plane(width: int, kinds: Collection[str], count: int, seed: int) -> list[Block]:
+    """Draw the same without their paces, in the plane."""
     random = np.random.default_rng([seed, width])
     top, reach = 2**width, min(2**width, 24)
     near = max(2, reach // 4)
@@ -129,7 +207,7 @@ def draw_blocks(width: int, kinds: Collection[str], count: int, seed: int) -> li
             x, y, *at = map(int, points)
             near_by = max(abs(x), abs(y)) < 2 * near
             blocks.append(line(x, y, **speed) if near_by and drawn > 7 else place(x, y))
-            own = dict(zip(OWN[kind], map(int, own), strict=True))
+            own = dict(zip(OWN[kind], map(int, own), strict=False))
             blocks.append((kind, {"end_x": at[0], "end_y": at[1], **own, **speed}))
             at = np.array(at)
         else:
@@ -281,7 +359,7 @@ def differences(
     [
         (("line",), 1, NO_STALLS, 0),
         (("line", "arc"), 8, Stalls(1, gap=0.8), 0),
-        (("line", "arc"), 7, NO_STALLS, 2**33),
+        (("line", "arc"), 4, NO_STALLS, 2**33),
         (("line", "arc", "conic"), 1, NO_STALLS, 0),
     ],
     ids=str,
@@ -302,9 +380,41 @@ def test_every_register_at_every_clock_in_pysim(kinds, seed, stalls, acceleratio
     assert set(seen["reg_current_kind"].tolist()) >= {CODES[kind] for kind in kinds}
 
 
+@pytest.mark.parametrize("parts", [LECTURE, MIXED], ids=["lecture", "mixed"])
+def test_every_register_with_the_lectures_interpolators(parts):
+    kinds = ("line", "arc", "conic")
+    seen, wrong = differences(
+        PysimModel,
+        make(4, kinds, parts=parts),
+        golden_of(parts, kinds, 4),
+        draw_blocks(4, kinds, 400, 1),
+        draw_orders(1000, 1),
+        1000,
+    )
+    assert wrong == []
+    assert {0, 1, 2} <= set(seen["reason"].tolist())
+    assert set(seen["reg_current_kind"].tolist()) >= {0, 1, 2}
+
+
+def test_every_register_of_three_axes():
+    """Lines of three axes, and arcs with z along them."""
+    kinds = ("line", "arc")
+    seen, wrong = differences(
+        PysimModel,
+        exact_device(4, 3, kinds, depth=1),
+        golden_of(PARTS, kinds, 4, 3),
+        draw_blocks(4, kinds, 400, 1, axes=3),
+        draw_orders(1000, 1),
+        1000,
+    )
+    assert wrong == []
+    assert {0, 1, 2} <= set(seen["reason"].tolist())
+    assert len(set(seen["position_z"].tolist())) > 5
+
+
 @pytest.mark.usefixtures("compiled_engine")
 def test_every_register_at_every_clock_compiled():
-    width, kinds, seed = 8, ("line", "arc"), 1
+    width, kinds, seed = 8, ("line", "arc"), 4
     choices: dict[str, Any] = {"pins": "quadrature", "pairing": False}
     seen, wrong = differences(
         CompiledModel,
@@ -325,23 +435,29 @@ def test_every_register_at_every_clock_compiled():
 
 @cache
 def expected_path(kind: str, width: int, start: tuple[int, int], block: tuple) -> list:
-    """Give the steps of one block: those of its golden interpolator alone."""
-    golden = INTERPOLATORS[kind](width)
-    values = dict(block)
+    """Give the steps of one block: those of its exact golden interpolator alone."""
+    return expected_steps(CORES[kind](width), kind, start, dict(block))
+
+
+def expected_steps(
+    golden: Any, kind: str, start: tuple[int, ...], values: dict[str, int], letters: str = "xy"
+) -> list:
+    """Give the steps of one block on a golden interpolator; ticks without one are left out."""
     own = {f"blocks_{name}": values.get(name, 0) for name in OWN[kind]}
-    given = own | {f"blocks_start_{a}": value for a, value in zip("xy", start, strict=True)}
-    given |= {f"blocks_end_{a}": values[f"end_{a}"] for a in "xy"}
+    given = own | {f"blocks_start_{a}": value for a, value in zip(letters, start, strict=True)}
+    given |= {f"blocks_end_{a}": values[f"end_{a}"] for a in letters}
     state, steps, fed = golden.reset(), [], False
     for _ in range(20_000):
         out = golden.outputs(state)
-        assert not out["error"], (kind, start, block)
+        assert not out["error"], (kind, start, values)
         if out["done"]:
             return steps
-        if out["steps_valid"]:
-            steps.append((out["steps_x"], out["steps_y"]))
+        step = tuple(out[f"steps_{a}"] for a in letters)
+        if out["steps_valid"] and any(step):
+            steps.append(step)
         state = golden.step(state, given | {"blocks_valid": int(not fed), "steps_ready": 1})
         fed = True
-    raise AssertionError(f"no answer to {kind} from {start} with {block}")
+    raise AssertionError(f"no answer to {kind} from {start} with {values}")
 
 
 def expected_pulses(width: int, blocks: list[Block]) -> list[tuple[int, int]]:
@@ -354,26 +470,27 @@ def expected_pulses(width: int, blocks: list[Block]) -> list[tuple[int, int]]:
     return steps
 
 
-def pulses_of(seen: Seen) -> tuple[np.ndarray, list[tuple[int, int]]]:
+def pulses_of(seen: Seen, letters: str = "xy") -> tuple[np.ndarray, list[tuple[int, ...]]]:
     """Give the clocks of leading edges on the pins, and the step that each shows."""
     edges = {
-        a: np.flatnonzero(np.diff(seen[f"pins_{a}_step"], prepend=0) == 1).tolist() for a in "xy"
+        a: np.flatnonzero(np.diff(seen[f"pins_{a}_step"], prepend=0) == 1).tolist() for a in letters
     }
-    clocks = sorted({*edges["x"], *edges["y"]})
-    ways = {a: dict.fromkeys(edges[a], 1) for a in "xy"}
+    clocks = sorted(set().union(*edges.values()))
+    ways = {a: dict.fromkeys(edges[a], 1) for a in letters}
     for a, way in ways.items():
         way.update({clock: 1 - 2 * int(seen[f"pins_{a}_direction"][clock]) for clock in way})
-    steps = [(ways["x"].get(clock, 0), ways["y"].get(clock, 0)) for clock in clocks]
+    steps = [tuple(ways[a].get(clock, 0) for a in letters) for clock in clocks]
     return np.array(clocks), steps
 
 
+#: Some at full speed, some at a constant one, and some at a pace that is not their own.
 TOUR = [
-    line(7, 3),
+    line(7, 3, pace=round((hypot(7, 3) / 7 - 1) * 2**16)),
     line(7, 3),
     line(5, 0),
-    arc(0, 5),
-    arc(-5, 0),
-    line(-5, 0),
+    arc(0, 5, pace=5 << 12),
+    arc(-5, 0, pace=2 << 12),
+    line(-5, 0, pace=2**17 - 1),
     line(-9, 6),
     place(-2, 2),
     arc(0, 0, center=(0, 2), clockwise=1),
@@ -411,6 +528,45 @@ def test_a_conic_on_the_device():
     assert seen["done"].sum() == 3
 
 
+@pytest.mark.parametrize("ticks", [31, 5, 400])
+def test_three_axes_on_the_pins(ticks):
+    """A line in space, a helix, and back: x and y of the exact arc, z as its ticks have it.
+
+    Half a circle of R = 8 is 25 ticks long, and z moves 31: with 31 ticks it steps in each, with 5
+    it is there after 31 ticks, too, and with 400 the last step waits until there is only one left.
+    """
+    helix = {"center_x": 0, "center_y": 0, "pace": round(8 * 8 * np.pi / 31 * 2**12)}
+    helix |= {"ticks": ticks}
+    blocks: list[Block] = [
+        line(8, 0, end_z=-15, pace=round((hypot(8, 15) / 15 - 1) * 2**17)),
+        ("arc", {"end_x": -8, "end_y": 0, "end_z": 16, **helix}),
+        line(-8, 0, end_z=16),
+        line(-5, -6, end_z=9),
+    ]
+    letters = "xyz"
+    pins = [f"pins_{a}_{pin}" for a in letters for pin in ("step", "direction")]
+    watch = (*pins, *(f"position_{a}" for a in letters), "done", "reason")
+    device = exact_device(5, 3, depth=4)
+    seen = run(PysimModel, device, blocks, 3000, calm(), watch=watch, until_idle=True)
+    _, steps = pulses_of(seen, letters)
+    starts = [(0, 0, 0), *(tuple(b[f"end_{a}"] for a in letters) for _, b in blocks)]
+    makes = {"line": GoldenExactLine(5, 3), "arc": golden_constant_arc(5, 3)}
+    expected = [
+        expected_steps(makes[kind], kind, start, values, letters)
+        for start, (kind, values) in zip(starts, blocks, strict=False)
+    ]
+    assert steps == [step for block in expected for step in block]
+    # In the plane the helix is the arc; z goes up with each step, or not.
+    plane = [step[:2] for step in expected[1] if any(step[:2])]
+    on_arc = tuple((name, blocks[1][1][name]) for name in ("end_x", "end_y"))
+    assert plane == expected_path("arc", 5, (8, 0), on_arc)
+    assert sum(step[2] for step in expected[1]) == 31
+    assert {step[2] for step in expected[1]} <= {0, 1}
+    assert seen["done"].sum() == len(blocks)
+    assert [seen[f"position_{a}"][-1] for a in letters] == [-5, -6, 9]
+    assert not seen["reason"].any()
+
+
 @pytest.mark.parametrize("depth", [1, 2, 16])
 def test_a_block_for_nobody_is_refused_in_its_turn(depth):
     blocks = [line(3, 0), ("conic", {"end_x": 1, "end_y": 1}), line(9, 9)]
@@ -436,15 +592,19 @@ def edges_of(blocks: list[Block], depth: int = 16) -> list[int]:
 
 @pytest.mark.parametrize("depth", [1, 2, 16])
 def test_lines_follow_each_other_without_a_gap(depth):
-    """A pulse is out for a clock and in for one: every edge comes two clocks after the last."""
+    """A pulse is out for a clock and in for one: every edge comes two clocks after the last.
+
+    Between two lines the interpolator has no step for one clock, in which the last one waits.
+    """
     clocks = edges_of([line(16, 0), line(32, 0), line(48, 0)], depth)
     assert np.diff(clocks).tolist() == [2] * 47
 
 
 def test_another_kind_follows_without_a_gap():
-    """16 steps take 32 clocks, the arc is prepared in 2n + 5 = 21 of them: no clock is lost.
+    """16 steps take 32 clocks, the arc is prepared in 7 of them: no clock is lost.
 
-    On the arc the steps of both axes take turns: one waits at most for the pulse before it.
+    The arc begins with y, and the line behind it, too, after a last step of x: nothing but the step
+    before it, which is put out in the clock in which the next one is taken, is waited for.
     """
     blocks = [line(16, 0), arc(0, 16), line(0, 32), line(0, 48)]
     clocks = edges_of(blocks)
@@ -457,13 +617,14 @@ def test_another_kind_follows_without_a_gap():
 
 
 def test_a_short_line_before_an_arc_waits_for_its_preparation():
-    """The arc is accepted one clock before the only step of the line leaves.
+    """The second line begins when the last step of the first is taken, in clock t.
 
-    Started 2n + 5 = 21 clocks later, it takes one for the half increment; 512 + 4·136 is the first
-    sum beyond M = 1024, in clock 26, and the step leaves in 27: 26 after that of the line.
+    The arc is handed over in t + 1 and offers its first step 7 clocks later: taken in t + 8,
+    launched in t + 9. The only step of the second line waits from t + 2 on, and is taken then, when
+    the one before is launched; its own launch is two clocks later, in t + 4.
     """
     clocks = edges_of([line(16, 0), line(17, 0), arc(0, 17)])
-    assert np.diff(clocks)[15:17].tolist() == [2, 26]
+    assert np.diff(clocks)[15:17].tolist() == [2, 9 - 4]
 
 
 # Stops.
@@ -594,6 +755,22 @@ def test_hold_loses_nothing_and_single_steps_go():
     assert clocks[(clocks > 18) & (clocks < 122)].tolist() == [63, 83]
     assert seen["done"].sum() == 2
     assert not seen["reason"].any()
+
+
+def test_a_single_step_passes_ticks_that_move_nothing():
+    """A line of which every other tick carries a step: at F = 1 they leave from clock 8 on.
+
+    Handed over in 1, so the first one waits in 8. The hold acts two clocks later: ticks leave in 8
+    to 15, the last of them empty. So the first single step is there at once, in the clock after the
+    edge, and is seen two later; the others have an empty tick to pass before.
+    """
+    orders = [*calm(), (14, "hold", 1), (120, "hold", 0)]
+    orders += [(at + k, "single", 1 - k) for at in (60, 80, 100) for k in (0, 1)]
+    blocks = [line(9, 0, pace=2**16)]
+    seen = run(PysimModel, make(4, ("line",)), blocks, 400, orders, until_idle=True)
+    clocks, steps = pulses_of(seen)
+    assert steps == [(1, 0)] * 9
+    assert clocks[clocks < 122].tolist() == [10, 12, 14, 16, 63, 84, 104]
 
 
 def test_stop_under_hold_with_a_single_step_that_waits():
@@ -732,6 +909,24 @@ def placed_under_a_pulse(queue, m):
 
 
 @broken
+def pace_lost(queue, m):
+    """Lines run at full speed."""
+    m.d.comb += queue.line_blocks.payload.pace.eq(0)
+
+
+@broken
+def pace_halved(queue, m):
+    """Arcs are told half of their pace."""
+    m.d.comb += queue.arc_blocks.payload.pace.eq(Value.cast(queue.head[("pace",)]) >> 1)
+
+
+@broken
+def ticks_paid_as_steps(device, m):
+    """A tick that moves both axes is as long as a diagonal, one that moves none takes no time."""
+    m.d.comb += device.feed.even.eq(0)
+
+
+@broken
 def hold_ignored(device, m):
     """`hold` does not come to the feed unit."""
     m.d.comb += device.feed.hold.eq(device.stop_asked)
@@ -794,7 +989,8 @@ def test_a_broken_device_differs_from_the_golden_model(name, sound):
 
 def stand_in(width: int, axes: int = 2) -> Any:
     """Give what a device asks an interpolator before it uses it: one that is made must be used."""
-    return SimpleNamespace(parameters={"width": width, "axes": axes})
+    blocks = SimpleNamespace(payload=Signal(line_block_layout(width, axes)))
+    return SimpleNamespace(parameters={"width": width, "axes": axes}, blocks=blocks)
 
 
 @pytest.mark.parametrize(
@@ -845,13 +1041,42 @@ def test_parameters_and_registers():
         "depth": 4,
         "pauses": (256, 362),
         "pairing": True,
+        "multiplier": False,
         "pins": "quadrature",
         "inverted_steps": "",
         "inverted_directions": "",
     }
     run(PysimModel, device, [], 1, [], watch=("busy",))  # a device that is made must be used
-    assert {"line_p1", "arc_p1", "pulse_hold", "reason", "current"} <= set(device.registers)
+    own = {"line_timer_debt", "line_p3", "arc_timer_debt", "arc_timer_x"}
+    assert own | {"pulse_hold", "reason", "current"} <= set(device.registers)
     assert "head" not in device.registers
     grouped = [signal for group in device.diagram.values() for signal in group]
     assert len(grouped) == len(device.registers)
     assert {id(signal) for signal in grouped} == set(map(id, device.registers.values()))
+
+
+@pytest.mark.parametrize(
+    ("kinds", "axes", "message"),
+    [
+        ((), 2, "kinds are (): choose one or more of line, arc, conic"),
+        (("line", "curve"), 2, "kinds are ('line', 'curve'): choose one or more of "),
+        (("conic",), 3, "number of axes is 3: conics lie in a plane, choose 2"),
+        (("line", "arc", "conic"), 3, "number of axes is 3: conics lie in a plane, choose 2"),
+    ],
+)
+def test_an_exact_device_is_refused(kinds, axes, message):
+    if message.endswith("of "):
+        message += "line, arc, conic"
+    assert_refused((ValueError, message), exact_device, 8, axes, kinds)
+
+
+def test_an_exact_device():
+    for axes, kinds in ((2, ("line", "arc", "conic")), (6, ("line", "arc"))):
+        device = exact_device(8, axes, kinds, depth=2, pins="quadrature")
+        Fragment.get(device, None)  # it must be used
+        assert {kind: type(part) for kind, part in device.interpolators.items()} == {
+            kind: ExactConic if kind == "conic" else ConstantSpeed for kind in kinds
+        }
+        assert device.queue.steady == ("line", "arc")
+        assert device.parameters["axes"] == axes
+        assert (device.parameters["depth"], device.parameters["pins"]) == (2, "quadrature")

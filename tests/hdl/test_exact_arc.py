@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from amaranth import Module, ResetInserter, Signal
+from amaranth.sim import Simulator
 
 from discreta.hdl.exact_arc import ExactArc
 from discreta.sim.compiled import CompiledModel
@@ -175,6 +177,35 @@ def test_a_missed_end_is_told_late_and_the_position_is_exact():
             radius = np.hypot(block[0], block[1])
             assert abs(np.hypot(*place) - radius) < 0.5
         clock = answer
+
+
+def test_a_device_that_stops_leaves_nothing_of_an_arc():
+    """The device resets its interpolators by an inserted reset, not by that of the domain."""
+    core, clear, m = ExactArc(5), Signal(), Module()
+    m.submodules.core = ResetInserter(clear)(core)
+    seen = []
+
+    async def bench(ctx):
+        block = core.blocks.payload
+        ctx.set(block, {"start": {"x": 15, "y": 0}, "end": {"x": 0, "y": 15}})
+        ctx.set(core.blocks.valid, 1)
+        ctx.set(core.steps.ready, 1)
+        for clock in range(24):
+            if clock % 12 == 11:
+                seen.append({name: ctx.get(it) for name, it in core.registers.items()})
+                ctx.set(clear, 1)
+                ctx.set(core.blocks.valid, 0)
+            await ctx.tick()
+        seen.append({name: ctx.get(it) for name, it in core.registers.items()})
+
+    simulator = Simulator(m)
+    simulator.add_clock(1e-8)
+    simulator.add_testbench(bench)
+    simulator.run()
+    reset = GoldenExactArc(5).reset()
+    assert seen[0]["running"] == 1
+    assert min(abs(seen[0][name] - reset[name]) for name in ("f", "axial", "diagonal")) > 0
+    assert seen[-1] == reset
 
 
 def test_registers_hold_every_flip_flop():

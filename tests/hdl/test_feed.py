@@ -50,7 +50,7 @@ def at_speed(speed, moves=({"moves_x": 1},), /, **inputs):
 
     def drive(_clock, shown):
         taken = shown["permit"]
-        none = dict.fromkeys(("moves_x", "moves_y"), 0)
+        none = dict.fromkeys(("moves_x", "moves_y", "even"), 0)
         move = moves[len(done) % len(moves)]
         done.extend([1] * taken)
         return steady | none | move | {"taken": taken}
@@ -66,7 +66,8 @@ def random_drive(axes, seed):
     """Drive everything there is, at random; most of it stays for a while."""
     random = np.random.default_rng(seed)
     letters = "xyzabc"[:axes]
-    now = {"active": 1, "override": FULL_OVERRIDE, "feed_exponent": 2, "single": 0}
+    now = {"active": 1, "override": FULL_OVERRIDE, "feed_exponent": 2}
+    now |= {"single": 0, "even": 0}
 
     def chance(probability):
         return int(random.random() < probability)
@@ -83,6 +84,7 @@ def random_drive(axes, seed):
         now["active"] = 1 - chance(0.01) if now["active"] else chance(0.3)
         now["hold"] = chance(0.03) if not now.get("hold") else 1 - chance(0.06)
         now["single"] ^= chance(0.2)
+        now["even"] ^= chance(0.1)
         now["begins"] = chance(0.03)
         far = int(random.choice([0, 1, 3, 60, 2**28 - 1]))
         now["ahead"] = int(random.integers(far + 1))
@@ -100,11 +102,12 @@ SETTINGS = [
 ]
 
 
+@pytest.mark.parametrize("multiplier", [False, True])
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
-def test_every_register_is_the_golden_models(setting):
+def test_every_register_is_the_golden_models(setting, multiplier):
     axes, pauses, pairing = setting
-    golden = Golden(axes, pauses, pairing)
-    core, drive = FeedUnit(axes, pauses=pauses, pairing=pairing), random_drive(axes, 7)
+    golden, drive = Golden(axes, pauses, pairing), random_drive(axes, 7)
+    core = FeedUnit(axes, pauses=pauses, pairing=pairing, multiplier=multiplier)
     idle = dict.fromkeys(PlainPorts(core).inputs, 0)
     given = []
 
@@ -172,6 +175,8 @@ def test_the_steps_leave_at_the_speed(speed, clocks):
 
 
 X, Y, BOTH = {"moves_x": 1}, {"moves_y": 1}, {"moves_x": 1, "moves_y": 1}
+#: Ticks of an interpolator at constant speed: one that moves nothing, and others.
+EMPTY, TICK_X, TICK_BOTH = ({"even": 1} | moves for moves in ({}, X, BOTH))
 
 
 @pytest.mark.parametrize(
@@ -187,6 +192,14 @@ X, Y, BOTH = {"moves_x": 1}, {"moves_y": 1}, {"moves_x": 1, "moves_y": 1}
         ((256, 362), True, (BOTH, X), [362, 256]),
         ((256, 362), False, (X, Y), [256]),
         ((256, 358), False, (BOTH, Y), [358, 256]),
+        # Ticks are all as long, and what comes behind one is another move.
+        ((256, 362), True, (EMPTY,), [256]),
+        ((256, 362), True, (TICK_BOTH, EMPTY, TICK_X), [256]),
+        ((256, 362), True, (TICK_X, Y), [256]),
+        ((256, 362), True, (Y, TICK_X), [256]),
+        ((256, 362), True, (X, EMPTY, Y, EMPTY), [256]),
+        ((256, 362), True, (BOTH, TICK_BOTH), [362, 256]),
+        ((256, 358), False, (EMPTY, BOTH, TICK_BOTH), [256, 358, 256]),
     ],
 )
 def test_pauses_after_steps(pauses, pairing, moves, wanted):
@@ -247,6 +260,30 @@ def test_single_steps():
     assert [clock for clock in permits_of(rows) if clock >= 91][:3] == [96, 100, 104]
 
 
+def test_a_single_step_goes_on_until_an_axis_moves():
+    """Under hold the ticks before it that move nothing are permitted, too, a clock each.
+
+    At 1/4 ticks leave in 3, 7 … 19, five of them: the second one moves, and every third behind it.
+    """
+    steady = at_speed(Fraction(1, 4), (EMPTY, TICK_X, EMPTY))
+
+    def drive(clock, shown):
+        # The edge in 60 is kept while its first tick comes late.
+        late = 60 <= clock < 65
+        orders = {"single": int(clock in (40, 60)), "hold": int(20 <= clock < 90)}
+        return orders | ({"taken": 0} if late else steady(clock, shown))
+
+    rows = simulate(FeedUnit(), 110, drive)
+    permits = permits_of(rows)
+    assert permits[:5] == [3, 7, 11, 15, 19]
+    # Two empty ones, and the one that moves; the late one waits from 61 to 64.
+    assert [clock for clock in permits if 22 <= clock < 92] == [41, 42, 43, *range(61, 68)]
+    assert all(row["still"] for row in rows[23:91])
+    assert not any(row["cell"] for row in rows)
+    # The last one has its own pause, which is over 4 clocks after the speed is back.
+    assert [clock for clock in permits if clock >= 91][:3] == [96, 100, 104]
+
+
 def test_hold_ends_still_also_where_the_acceleration_has_grown():
     def drive(clock, shown):
         steady = at_speed(Fraction(1, 64), ahead=9999, begins=int(clock == 0))(clock, shown)
@@ -270,7 +307,12 @@ def test_registers_hold_every_flip_flop(setting):
         *setting
     ).registers()
     assert list(core.registers) == [it.name for group in core.diagram.values() for it in group]
-    assert core.parameters == {"axes": axes, "pauses": pauses, "pairing": pairing}
+    assert core.parameters == {
+        "axes": axes,
+        "pauses": pauses,
+        "pairing": pairing,
+        "multiplier": False,
+    }
 
 
 def test_pauses_are_roots():
@@ -283,6 +325,8 @@ def test_refuses_other_parameters():
         assert_refused((error, message), FeedUnit, axes)
     message = "pairing must be True or False, not 1"
     assert_refused((TypeError, message), FeedUnit, pairing=1)
+    message = "multiplier must be True or False, not 1"
+    assert_refused((TypeError, message), FeedUnit, multiplier=1)
     for pauses in ((256, 358.4), (256, "362"), (True, 362)):
         message = f"pauses must be whole numbers of 1/256, not {pauses!r}"
         assert_refused((TypeError, message), FeedUnit, pauses=pauses)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from amaranth.hdl import Fragment
 
+from discreta.hdl.device import Device, exact_device
 from discreta.hdl.feed import FeedUnit
 from discreta.hdl.plain import block_fields
 from discreta.hdl.pulse import PulseUnit
@@ -117,18 +118,34 @@ def test_pulses_slow_the_interpolator_down_and_lose_nothing():
 
 
 def test_blocks_of_a_device():
-    core = METHODS["linear"].core(WIDTH)
-    Fragment.get(core, None)  # it must be used
-    fields = [
-        *("blocks_kind", "blocks_feed_mantissa", "blocks_feed_exponent", "blocks_ahead"),
-        *("blocks_end_x", "blocks_end_y"),
-    ]
-    blocks = device_blocks(fields, PATH, block_fields(core), Drive(Fraction(3, 8)))
+    """On the lecture's interpolator the path is the octagon's; there is no pace to be told."""
+    device = Device(line=METHODS["linear"].core(WIDTH))
+    Fragment.get(device, None)  # it must be used
+    blocks = device_blocks(device, PATH, Drive(Fraction(3, 8)))
     ends = PATH.points[1:].tolist()
     ahead = np.cumsum(octagon(PATH.blocks, "line")[::-1])[::-1].round()
     assert blocks.tolist() == [
         [3, 0, 0, 0, 3, 5],
         *([0, 0x8000, 2, far, *end] for far, end in zip(ahead, ends, strict=True)),
+    ]
+
+
+def test_blocks_of_a_device_at_constant_speed():
+    """A line is as long as it is: that is the path, and its pace is length/L − 1."""
+    device = exact_device(WIDTH)
+    Fragment.get(device, None)  # it must be used
+    assert block_fields(device)[4:7] == ("blocks_end_x", "blocks_end_y", "blocks_pace")
+    blocks = device_blocks(device, PATH, Drive(Fraction(3, 8)))[:, :7]
+    ends = PATH.points[1:]
+    ways = np.abs(np.diff(PATH.points, axis=0))
+    length, longest = np.hypot(*ways.T), ways.max(axis=1)
+    ahead = np.cumsum(length[::-1])[::-1].round()
+    pace = np.rint((length / np.maximum(longest, 1) - 1) * 2 ** (WIDTH + 12))
+    # One of them has no length.
+    pace[longest == 0] = 0
+    assert blocks.tolist() == [
+        [3, 0, 0, 0, 3, 5, 0],
+        *([0, 0x8000, 2, *row] for row in zip(ahead, *ends.T, pace, strict=True)),
     ]
 
 

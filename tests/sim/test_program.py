@@ -111,17 +111,34 @@ def test_lines_in_three_axes_with_arcs_between_run_core_by_core():
     assert cores.ends_reached == 3
     for (_, _, points), move in zip(cores, drill.moves, strict=True):
         assert np.array_equal(points, golden_path(move, 10))
-    with pytest.raises(BadInputError, match="arcs and moves Z: on the device exact_arc has 2 axes"):
-        run_program(drill, width=10, drive=Drive())
 
 
-def test_a_helix_is_refused_with_its_line():
-    with pytest.raises(BadInputError) as error:
-        run_program(program("F1 G0 X10\nG3 X0 Y10 Z1 I-10\nM2"))
-    assert str(error.value) == (
-        "line 2 is an arc along which Z moves, and exact_arc has 2 axes: leave Z out, or make it "
-        "of lines"
-    )
+def test_a_helix_moves_z_evenly_along_the_arc_and_ends_exactly():
+    helix = program("F1 G0 X10\nG3 X0 Y10 Z3 I-10\nG2 X10 Y0 Z-2 I0 J-10 P2\nM2")
+    cores = Cores(helix, 12)
+    cores.run("pysim")
+    assert cores.ends_reached == 3
+    for (number, _, points), move in zip(cores, helix.moves, strict=True):
+        assert points[-1].tolist() == list(move.end)
+        if move.helical:
+            x, y, z = points.T
+            assert helix.errors(number, points).max() < 0.5 + 1e-9
+            turned = np.abs(np.unwrap(np.arctan2(y, x)) - np.arctan2(move.start[1], move.start[0]))
+            on_line = move.start[2] + (move.end[2] - move.start[2]) * turned / move.sweep
+            # Half a step, and where the arc is up to a step and a half ahead or behind.
+            assert np.abs(z - on_line).max() < 0.5 + 1.5 * 30 / 157 + 0.1
+
+
+@pytest.mark.usefixtures("optimized_engine")
+def test_a_helix_on_the_device():
+    helix = program("F60 G0 X10\nG3 X0 Y10 Z3 I-10\nG2 X10 Y0 Z-2 I0 J-10 P2\nM2")
+    feeds = speeds(helix.moves, Fraction(10_000), Fraction(600))
+    summary = run_program(helix, width=12, engine="compiled", drive=Drive(), feeds=feeds)
+    assert summary["end point reached"]
+    assert summary["same points from the pins"]
+    # The pauses of all moves are their lengths by their speeds.
+    due = sum(move.true_length / feed for move, feed in zip(helix.moves, feeds, strict=True))
+    assert abs(summary["device clocks"] / due - 1) < 0.01
 
 
 def test_speeds_are_along_the_path():

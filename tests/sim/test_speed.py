@@ -2,7 +2,7 @@
 # (A model that is found in the cache is not built again.)
 """What is measured of the speed: against closed values, and seen to tell a bad rule."""
 
-from math import ceil, sqrt
+from math import ceil, pi, sqrt
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ import pytest
 from discreta.hdl.comparison import Comparison
 from discreta.hdl.linear import Linear
 from discreta.sim import speed
+from discreta.sim.constant_speed import paced
 from discreta.sim.speed import (
     DEVICE,
     MOVES,
@@ -17,6 +18,8 @@ from discreta.sim.speed import (
     Rule,
     accuracy,
     along_path,
+    drift,
+    helices,
     limits,
     move_beginnings,
     step_clocks,
@@ -88,6 +91,66 @@ def test_moves_begin(steps, begins):
     assert move_beginnings(np.where(moves, -1, 0)).tolist() == begins
 
 
+@pytest.mark.usefixtures("compiled_engine")
+def test_at_constant_speed_the_machine_is_where_it_should_be():
+    """Never two steps from F·t, over ticks rounded to clocks and to points of the grid."""
+    line, circle = drift(degrees=(0, 23, 45, 200), radii=(100,), length=300, width=9)
+    assert (line.what, line.curves) == ("lines of 300 steps", 4)
+    assert (circle.what, circle.curves) == ("circles, R = 100", 2)
+    for row in (line, circle):
+        assert 0 <= row.at_end <= max(row.ahead, row.behind)
+        assert 0.1 < row.ahead < 2
+        assert 0.1 < row.behind < 2
+
+
+@pytest.mark.usefixtures("compiled_engine")
+def test_a_wrong_pace_is_seen(monkeypatch):
+    """With a pace of 0 a diagonal is made in 212 ticks in place of 300: it ends 88 steps ahead.
+
+    With one of 64/65 the circle takes so much longer: 2·π·100/64 ticks are nearly 10 steps.
+    """
+
+    def untold(kind, blocks, width, axes):
+        told = paced(kind, blocks, width, axes)
+        told[:, -1] = 0 if kind == "line" else told[:, -1] * 64 // 65
+        return told
+
+    monkeypatch.setattr(speed, "paced", untold)
+    line, circle = drift(degrees=(45,), radii=(100,), length=300, width=9)
+    assert line.ahead == pytest.approx(300 - 300 / sqrt(2), abs=1.5)
+    assert line.at_end == line.ahead
+    assert circle.behind == pytest.approx(2 * pi * 100 / 65, abs=2)
+    assert circle.ahead < 2
+
+
+@pytest.mark.usefixtures("compiled_engine")
+def test_helices():
+    """Every one ends on its end point, half a step from its circle and from its line at most."""
+    flat, steep = helices((0.5, 5), count=5, width=7)
+    assert [(row.steepness, row.helices, row.ends_missed) for row in (flat, steep)] == [
+        (0.5, 5, 0),
+        (5, 5, 0),
+    ]
+    for row in (flat, steep):
+        assert 0.2 < row.off_circle < 1
+        assert row.off_line < 1.5
+        assert row.off_ticks < 4
+    # A steep axis steps in every tick, and is always where it belongs.
+    assert flat.off_line > 0.2
+
+
+@pytest.mark.usefixtures("compiled_engine")
+def test_a_helix_that_misses_its_end_is_seen(monkeypatch):
+    def beside(kind, blocks, width, axes):
+        told = paced(kind, blocks, width, axes)
+        told[:, 5] += 1
+        return told
+
+    monkeypatch.setattr(speed, "paced", beside)
+    (row,) = helices((0.5,), count=5, width=7)
+    assert row.ends_missed == 5
+
+
 def test_speeds_are_exact(monkeypatch):
     # One speed of an octave, in half of the clocks: one clock more or less is half of the unit.
     monkeypatch.setattr(speed, "_MANTISSAS", ())
@@ -117,10 +180,16 @@ def test_limits():
     assert (linear.method, line.method, arc.method) == ("linear", DEVICE, DEVICE)
     assert (linear.curve, line.curve, arc.curve) == ("line", "line", "arc")
     assert (linear.least, linear.most) == (1, 2)
-    assert line.steps == linear.steps
-    # On an axis alone a pulse and its space are two clocks.
-    assert linear.mean < 1.5 < line.mean < 2
-    assert line.most >= 2
+    # Where the lecture's makes two steps the exact line makes a diagonal one: its longest way.
+    ways = speed._sample("line", 4)[:, 2:]
+    longest = np.abs(ways).max(axis=1)
+    assert line.steps == (longest - 1).sum()
+    assert linear.steps > line.steps
+    # A step is there in every clock, and one axis moves with each: its pulse and space are two.
+    assert (line.least, line.mean, line.most) == (2, 2, 2)
+    # An axis of an arc that turns round has set-up and hold of the direction for a space.
+    assert (arc.least, arc.most) == (2, 3)
+    assert 2 < arc.mean < 2.1
     for row in (linear, line, arc):
         assert row.mean_ns == pytest.approx(20 * row.mean)
         assert row.most_ns == 20 * row.most

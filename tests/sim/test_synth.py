@@ -17,14 +17,18 @@ from discreta.hdl.contract import Part
 from discreta.hdl.harness import Harness, LoneAccumulator
 from discreta.hdl.linear import Linear
 from discreta.hdl.parts import Summator
-from discreta.sim.synth import DEVICES, RUNS, SEEDS, measure
+from discreta.sim.fpga import FPGAS
+from discreta.sim.synth import RUNS, SEEDS, measure
 from discreta.sim.yosys import yosys
 from tests.hdl.parts.clocked import assert_refused
 from tests.hdl.test_harness import Twice
 
 MISSING = [
     name
-    for name in ("pyosys", *sorted({f"yowasp_nextpnr_{fpga.place}" for fpga in DEVICES.values()}))
+    for name in (
+        "pyosys",
+        *sorted({f"yowasp_nextpnr_{fpga.tools.name}" for fpga in FPGAS.values()}),
+    )
     if find_spec(name) is None
 ]
 needs_boards = pytest.mark.skipif(
@@ -126,8 +130,8 @@ def test_nothing_of_core_and_harness_is_shared_or_left_out(tmp_path):
 
 @needs_boards
 def test_what_does_not_fit_is_counted_but_not_placed(monkeypatch):
-    small = replace(DEVICES["hx8k"], options=("--lp384", "--package", "qn32"))
-    monkeypatch.setitem(DEVICES, "lp384", small)
+    small = replace(FPGAS["hx8k"], options=("--lp384", "--package", "qn32"))
+    monkeypatch.setitem(FPGAS, "lp384", small)
     measured = measure(Wide(400), "lp384", (1,))
     assert (measured.fmax, measured.median, measured.path) == ({}, None, None)
     assert measured.flip_flops == 400
@@ -159,9 +163,9 @@ def test_an_interrupt_ends_all_that_runs_and_leaves_nothing(monkeypatch, tmp_pat
 
 def test_what_cannot_be_asked():
     core = LoneAccumulator(4)
-    choose = " or ".join(map(repr, DEVICES))
+    choose = " or ".join(map(repr, FPGAS))
     assert_refused(
-        (ValueError, f"device is 'hx1k': choose {choose}"), lambda: measure(core, "hx1k")
+        (ValueError, f"device is 'hx4k': choose {choose}"), lambda: measure(core, "hx4k")
     )
     assert_refused(
         (ValueError, "seeds are none: give one or more whole numbers"),

@@ -1,15 +1,18 @@
 """The golden model of the device against its rules, in clocks reckoned by hand."""
 
 import inspect
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import z3
 
 from discreta.sim.golden import device, queue
-from discreta.sim.golden.circular import Circular
-from discreta.sim.golden.conic import Conic
+from discreta.sim.golden.constant_speed import ConstantSpeed
 from discreta.sim.golden.device import make_device
+from discreta.sim.golden.exact_arc import ExactArc
+from discreta.sim.golden.exact_conic import ExactConic
+from discreta.sim.golden.exact_line import ExactLine
 from discreta.sim.golden.linear import Linear
 from discreta.sim.smt import symbols
 
@@ -42,19 +45,31 @@ LINE = {"kind": 0, "end_x": 8, "end_y": 0}
 
 
 def test_clocks_of_a_line():
-    """Accepted in 0, handed over in 1, prepared and summed: a step a pulse of 1 in and 1 out.
+    """Accepted in 0, handed over in 1: the first step of the exact line waits 7 clocks later, in 8.
 
-    The line of 8 steps is summed to M = 16 from clock 3 on, by 8 in every clock beginning with M/2:
-    it carries in every other one, and its first step waits in clock 4. That is before the speed:
-    the block begins in 2, so F is multiplied in 3, is the target in 5 and the rate in 6.
+    That is behind the speed: the block begins in 2, so F is multiplied in 3, is the target in 5 and
+    the rate in 6. From then on a step waits in every clock, and leaves when the one before it is
+    launched: a pulse of 1 in and 1 out takes two clocks.
     """
     shown = trace(make_device(4, ("line",)), [LINE], 40)
-    # Taken in 6, pending in 7, seen in 8.
-    assert edges(shown, "x_step") == list(range(8, 24, 2))
-    assert [out["position_x"] for out in shown[7:25:2]] == list(range(9))
-    # The last step leaves in 20, done follows by a clock; its pulse is out in 22, and in in 23.
-    assert [clock for clock, out in enumerate(shown) if out["done"]] == [21]
-    assert [out["busy"] for out in shown] == [0] + [1] * 22 + [0] * 17
+    # Taken in 8, pending in 9, seen in 10.
+    assert edges(shown, "x_step") == list(range(10, 26, 2))
+    assert [out["position_x"] for out in shown[9:27:2]] == list(range(9))
+    # The second one is taken in 9 and waits for two clocks, as all behind it: the last one leaves
+    # in 21, done follows by a clock; its pulse is out in 24, and in in 25.
+    assert [clock for clock, out in enumerate(shown) if out["done"]] == [22]
+    assert [out["busy"] for out in shown] == [0] + [1] * 24 + [0] * 15
+
+
+def test_clocks_of_a_line_in_ticks():
+    """At a pace of 2 every other tick carries a step, beginning with the first, half a tick due.
+
+    A tick leaves in every clock from 8 on, also those that the pulses have nothing to do with: the
+    last step in 22, the eighth one.
+    """
+    shown = trace(make_device(4, ("line",)), [LINE | {"pace": 2**16}], 40)
+    assert edges(shown, "x_step") == list(range(10, 26, 2))
+    assert [clock for clock, out in enumerate(shown) if out["done"]] == [23]
 
 
 def test_done_in_order_without_steps():
@@ -89,18 +104,25 @@ def test_emergency():
         [(12, "emergency", 1), (13, "emergency", 0), (30, "clear", 1)],
     )
     assert [out["reason"] for out in shown] == [0] * 13 + [2] * 18 + [0] * 29
-    assert [clock for clock in edges(shown, "x_step") if clock <= 31] == [8, 10, 12]
-    # Five steps are left of the line that is accepted after it.
+    assert [clock for clock in edges(shown, "x_step") if clock <= 31] == [10, 12]
+    # Six steps are left of the line that is accepted after it.
     assert len(edges(shown, "x_step")) == 8
 
 
 def test_what_it_is_made_of():
     golden = make_device(6, ("conic", "line", "arc"), "quadrature", False)
-    assert golden.interpolators == (("line", Linear(6)), ("arc", Circular(6)), ("conic", Conic(6)))
+    line, arc = ConstantSpeed(ExactLine(6)), ConstantSpeed(ExactArc(6))
+    assert golden.interpolators == (("line", line), ("arc", arc), ("conic", ExactConic(6)))
     assert (golden.feed.pairing, golden.pulse.kind) == (False, "quadrature")
     assert (golden.width, golden.axes, golden.letters) == (6, 2, "xy")
     assert set(golden.reset()) == set(golden.registers())
     assert golden.queue.kinds == ("line", "arc", "conic")
+    assert golden.queue.steady == ("line", "arc")
+    # Those of the lecture can be chosen, and know nothing of ticks.
+    lecture = replace(golden, interpolators=(("line", Linear(6)), ("arc", arc)))
+    assert lecture.queue.steady == ("arc",)
+    assert "blocks_pace" in lecture.inputs()
+    assert "blocks_pace" not in replace(lecture, interpolators=(("line", Linear(6)),)).inputs()
 
 
 @pytest.mark.parametrize("kinds", [("line",), ("line", "arc")])

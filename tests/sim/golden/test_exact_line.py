@@ -64,7 +64,7 @@ def test_every_line_of_eight_bits_is_half_a_step_off_at_most():
     distance = np.abs(beside) / np.hypot(*ways.T)
     assert 0.4999 < distance.max() < 0.5
     # A step a clock: the leading axis is done L clocks after its first step.
-    assert np.array_equal(answered, ways[:, 0] + 7)
+    assert np.array_equal(answered, ways[:, 0] + 8)
 
 
 def test_a_tie_goes_upwards():

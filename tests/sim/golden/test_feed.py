@@ -12,7 +12,7 @@ from discreta.sim.golden.feed import FeedUnit
 from discreta.sim.smt import symbols
 
 ONE, FULL = 2**48, 128
-WORDS = ("begins", "ahead", "taken", "hold", "single", "acceleration", "moves_y")
+WORDS = ("begins", "ahead", "taken", "even", "hold", "single", "acceleration", "moves_y")
 
 
 def steady(speed, **inputs):
@@ -140,6 +140,32 @@ def test_hold_in_any_clock_of_a_ramp_loses_nothing():
         assert (held_end["to_go"], len(held)) == (end["to_go"], 40)
 
 
+@pytest.mark.parametrize("pairing", [True, False])
+def test_ticks_are_all_as_long(pairing):
+    """Whatever a tick moves the next one comes after 1/F, the path is 1 shorter, the cell empty."""
+    golden, feed = FeedUnit(2, (256, 362), pairing), Fraction(3, 7)
+    given = steady(feed, even=1, ahead=100)
+    state, clocks = golden.reset(), []
+    for clock in range(160):
+        taken = golden.outputs(state)["permit"]
+        moves = {f"moves_{a}": len(clocks) >> bit & 1 for bit, a in enumerate("xy")}
+        begins = {"begins": int(clock == 0)}
+        state = golden.step(state, given | moves | begins | {"taken": taken})
+        clocks += [clock] * taken
+        assert state["cell"] == 0
+        assert state["to_go"] == 256 * (100 - len(clocks))
+    assert clocks == [3 + ceil(k / feed_of(*encode_feed(feed))) for k in range(len(clocks))]
+    assert len(clocks) > 60
+
+
+def test_a_single_step_waits_for_one_that_moves():
+    golden, given = FeedUnit(), steady(1, hold=1)
+    state = golden.step(golden.reset(), given | {"single": 1})
+    for moves, waits in ((0, 1), (0, 1), (1, 0), (1, 0)):
+        state = golden.step(state, given | {"even": 1, "taken": 1, "moves_x": moves, "single": 1})
+        assert state["single_step"] == golden.outputs(state)["permit"] == waits
+
+
 RAMPS = [
     (400, Fraction(1, 4), Fraction(1, 2**12)),
     (1000, Fraction(1, 2), Fraction(1, 2**10)),
@@ -222,8 +248,8 @@ def test_integers_arrays_and_bit_vectors_agree():
     kinds = golden.registers()
     inputs = {"feed_mantissa": 16, "feed_exponent": 5, "ahead": 28, "override": 9}
     inputs |= {"acceleration": 40}
-    flags = ("active", "begins", "taken", "hold", "single", "moves_x", "moves_y", "moves_z")
-    inputs |= dict.fromkeys(flags, 1)
+    flags = ("active", "begins", "taken", "even", "hold", "single")
+    inputs |= dict.fromkeys((*flags, *(f"moves_{a}" for a in "xyz")), 1)
     count = 60
     # An array has room for B below 2^63, as it is.
     state = {

@@ -7,11 +7,18 @@ import pytest
 
 from discreta.hdl.circular import Circular
 from discreta.hdl.conic import Conic
-from discreta.hdl.device import Device
+from discreta.hdl.constant_speed import constant_arc, constant_line
+from discreta.hdl.device import Device, exact_device
+from discreta.hdl.exact_conic import ExactConic
+from discreta.hdl.feed import PAUSES
 from discreta.hdl.linear import Linear
+from discreta.sim.golden import constant_speed as golden_models
+from discreta.sim.golden.circular import Circular as GoldenCircular
+from discreta.sim.golden.conic import Conic as GoldenConic
 from discreta.sim.golden.device import EMERGENCY, LIMIT, make_device
 from discreta.sim.golden.device import Device as GoldenDevice
 from discreta.sim.golden.feed import FeedUnit
+from discreta.sim.golden.linear import Linear as GoldenLinear
 from discreta.sim.golden.logic import equal, negate, where
 from discreta.sim.golden.pulse import PulseUnit
 from discreta.sim.golden.queue import CODES
@@ -23,7 +30,9 @@ from discreta.sim.smt import check, equivalence
 #: Hook of the golden models that changes nothing.
 KEEP = inspect.signature(GoldenDevice.step).parameters["tell"].default
 
-PARTS = {"line": Linear, "arc": Circular, "conic": Conic}
+PARTS = {"line": constant_line, "arc": constant_arc, "conic": ExactConic}
+LECTURE = {"line": (Linear, GoldenLinear), "arc": (Circular, GoldenCircular)}
+LECTURE |= {"conic": (Conic, GoldenConic)}
 
 
 # All three kinds of 8 bits take 17 s: `discreta prove device` takes what is asked for.
@@ -40,6 +49,27 @@ def test_it_is_the_golden_model(width, kinds, choices):
     device = Device(**{kind: PARTS[kind](width) for kind in kinds}, depth=1, **choices)
     claims = equivalence(device, make_device(width, kinds, **choices))
     assert len(claims) == 5
+    assert [verdict for verdict in map(check, claims) if not verdict.holds] == []
+
+
+@pytest.mark.parametrize(("width", "kinds"), [(16, ("line", "arc")), (4, ("conic",))], ids=str)
+def test_it_is_the_golden_model_with_the_lectures_interpolators(width, kinds):
+    device = Device(**{kind: LECTURE[kind][0](width) for kind in kinds}, depth=1)
+    models = tuple((kind, LECTURE[kind][1](width)) for kind in kinds)
+    golden = GoldenDevice(models, FeedUnit(), PulseUnit(width))
+    claims = equivalence(device, golden)
+    assert len(claims) == 5
+    assert [verdict for verdict in map(check, claims) if not verdict.holds] == []
+
+
+def test_it_is_the_golden_model_of_three_axes():
+    """Lines in space, arcs with an axis along them."""
+    models = (
+        ("line", golden_models.constant_line(6, 3)),
+        ("arc", golden_models.constant_arc(6, 3)),
+    )
+    golden = GoldenDevice(models, FeedUnit(3, PAUSES[:3]), PulseUnit(6, 3))
+    claims = equivalence(exact_device(6, 3, ("line", "arc"), depth=1), golden)
     assert [verdict for verdict in map(check, claims) if not verdict.holds] == []
 
 
@@ -60,7 +90,8 @@ def test_everything_is_promised(width, kinds, pins):
 
 
 def test_the_queue_of_three_axes():
-    verdicts = [check(promise) for promise in queue_promises(GoldenQueue(8, 3, ("line",)))]
+    kinds = ("line", "arc")
+    verdicts = [check(promise) for promise in queue_promises(GoldenQueue(8, 3, kinds, kinds))]
     assert [verdict for verdict in verdicts if not verdict.holds] == []
 
 

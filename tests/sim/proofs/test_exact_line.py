@@ -46,7 +46,7 @@ class RareTwice(Broken):
 @dataclass(frozen=True)
 class OneTooMany(Broken):
     def changed(self, state, _inputs, after):
-        return {"one": after["one"] | negate(state["idle"])}
+        return {"more": after["more"] & state["works"]}
 
 
 @dataclass(frozen=True)
@@ -58,17 +58,16 @@ class LostUnderStall(Broken):
 @dataclass(frozen=True)
 class OtherStart(Broken):
     def changed(self, state, _inputs, after):
-        return {"p3": where(state["loaded"], state["p3"], after["p3"])}
+        return {"p3": where(state["starting"], state["p3"], after["p3"])}
 
 
 @dataclass(frozen=True)
 class RoundedDown(Broken):
     """The first residual without the carry that rounds it."""
 
-    def _prepared(self, state, takes):
-        after = super()._prepared(state, takes)
+    def _prepared(self, state):
         way = state["way_follow"] + (state["way_lead"] >> 1)
-        return after | {"ready_rest": where(takes, self._wrap(way), state["ready_rest"])}
+        return super()._prepared(state) | {"ready_rest": self._wrap(way)}
 
 
 @dataclass(frozen=True)
@@ -82,8 +81,8 @@ class NeverAnswers(Broken):
 class RunsTooLong(Broken):
     """A way of −2^n is not refused."""
 
-    def _length(self, way):
-        return super()._length(way) & (2**self.width - 1)
+    def _prepared(self, state):
+        return super()._prepared(state) | {"ready_fault": state["way_fault"]}
 
 
 @pytest.mark.parametrize(

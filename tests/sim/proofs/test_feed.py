@@ -195,9 +195,57 @@ class SlowSpeedsStop(Unchecked):
         return {"target": after["target"] >> 12 << 12}
 
 
+@dataclass(frozen=True)
+class TicksArePaidForAsSteps(Unchecked):
+    """A tick that moves both axes is as long as a diagonal."""
+
+    def mistake(self, state, inputs, _after):
+        uneven = inputs | {"even": 0 * inputs["even"]}
+        return {"debt": super(Unchecked, self).step(state, uneven)["debt"]}
+
+
+@dataclass(frozen=True)
+class TicksArePathAsSteps(Unchecked):
+    """The path is shorter by what a tick moves."""
+
+    def mistake(self, state, inputs, _after):
+        uneven = inputs | {"even": 0 * inputs["even"]}
+        return {"to_go": super(Unchecked, self).step(state, uneven)["to_go"]}
+
+
+@dataclass(frozen=True)
+class CellIsKeptByTicks(Unchecked):
+    """A step behind a tick is the second half of a diagonal."""
+
+    def mistake(self, state, inputs, after):
+        return {"cell": where(inputs["even"], state["cell"], after["cell"])}
+
+
+@dataclass(frozen=True)
+class SingleEndsWithAnEmptyTick(Unchecked):
+    """A single step is used up by a tick that moves nothing."""
+
+    def mistake(self, _state, inputs, after):
+        return {"single_step": where(inputs["taken"], 0, after["single_step"])}
+
+
+@dataclass(frozen=True)
+class SingleNeverEnds(Unchecked):
+    """A tick that moves an axis does not end a single step."""
+
+    def mistake(self, state, inputs, after):
+        kept = state["single_step"] & inputs["hold"]
+        return {"single_step": where(inputs["even"], kept, after["single_step"])}
+
+
 @pytest.mark.parametrize(
     ("broken", "promise"),
     [
+        (TicksArePaidForAsSteps, "pause: a step leaves"),
+        (TicksArePathAsSteps, "path left"),
+        (CellIsKeptByTicks, "pause: a step leaves"),
+        (SingleEndsWithAnEmptyTick, "single step"),
+        (SingleNeverEnds, "single step"),
         (StepsAreNotPaidFor, "never too fast"),
         (StepsAreNotPaidFor, "pause: a step leaves"),
         (FractionIsLost, "never too slow"),
@@ -245,6 +293,24 @@ def no_pairing(m, core):
     """The axes before are forgotten, also where both steps are one move."""
     with m.If(core.taken):
         m.d.sync += core.cell.eq(Cat(core.moves.x, core.moves.y))
+
+
+def cell_kept_by_ticks(m, core):
+    """The axes before a tick are remembered."""
+    with m.If(core.taken & core.even):
+        m.d.sync += core.cell.eq(core.cell)
+
+
+def ticks_cost_as_steps(m, core):
+    """A tick that moves both axes is as long as a diagonal."""
+    with m.If(core.taken & core.even & core.moves.x & core.moves.y & (core.debt == 0)):
+        m.d.sync += core.debt.eq((362 << 40) - core.rate)
+
+
+def single_ends_with_an_empty_tick(m, core):
+    """A single step is used up by whatever is taken."""
+    with m.If(core.taken):
+        m.d.sync += core.single_step.eq(0)
 
 
 def pause_too_long(m, core):
@@ -315,6 +381,9 @@ def late_failure(m, core):
     ("change", "seen_by"),
     [
         (no_pairing, "every register"),
+        (cell_kept_by_ticks, "every register"),
+        (ticks_cost_as_steps, "every register"),
+        (single_ends_with_an_empty_tick, "every register"),
         (pause_too_long, "every output"),
         (debt_not_limited, "every register"),
         (rate_a_clock_too_soon, "every register"),
