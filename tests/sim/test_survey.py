@@ -320,9 +320,12 @@ def test_a_broken_device_is_reported(monkeypatch, preload, seen, right):
     row = row_of(broken(monkeypatch, LINES, Wrong, preload=(preload,)), 4, groups)
     assert not row.good
     line = groups[0].blocks[0].tolist()
-    assert row.findings == [
+    register, *above = row.findings
+    assert register == (
         f"sx is {seen} in clock 0 of the line {line}, where the golden model has {right}"
-    ]
+    )
+    # Preload zero leads farther off than is proven of preload half.
+    assert [finding.endswith("where 0.7071 is proven") for finding in above] == [True] * (not seen)
     # It is judged by what it did: as the other preload.
     other = {"zero": "half", "half": "zero"}[preload]
     assert row.largest_error == pytest.approx(lines_brute_force(True, other)[0], abs=1e-12)
@@ -343,7 +346,9 @@ def test_ends_that_are_missed_are_counted(monkeypatch):
     assert not row.good
     # All lines but those that are upright anyway.
     assert (row.blocks, row.ends_missed) == (256, 240)
-    assert len(row.findings) == 1
+    register, above = row.findings
+    assert "where the golden model has" in register
+    assert above.startswith("the error is 10.6066 at ")
     # The corner (0, 15) is that far from the line to (15, 15).
     assert row.largest_error == pytest.approx(15 / 2**0.5)
 
