@@ -244,8 +244,8 @@ def test_the_exact_border(discreta):
     lengths = [max(abs(u - x), abs(v - y)) for (x, y), (u, v) in pairwise(points)]
     expected = {"method": "exact_line", "largest error": 0.4999, "error bound": 0.5}
     expected |= {"steps": sum(lengths), "support points hit": 178, "path closed": True}
-    # The first step waits 7 clocks, and one lies between two lines.
-    expected |= {"clocks": sum(lengths) + 6 + len(lengths) - 1, "end point reached": True}
+    # The first step waits 8 clocks, and one lies between two lines.
+    expected |= {"clocks": sum(lengths) + 7 + len(lengths) - 1, "end point reached": True}
     assert summary == summary | expected
 
 
