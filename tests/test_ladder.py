@@ -81,8 +81,8 @@ SOME = {
 }
 
 # How many broken variants a method has at least, if not 12. The stages of an arc in two stages are
-# those of an arc on a carrier and of a line in two stages, whose variants tell of both; exact conics
-# have theirs in tests/hdl.
+# those of an arc on a carrier and of a line in two stages, whose variants tell of both; exact
+# conics have theirs in tests/hdl.
 FEWEST = {"exact_arc": 10, "exact_conic": 0}
 FEWEST |= {"carrier_linear": 8, "two_stage_linear": 8, "two_stage_circular": 0}
 
