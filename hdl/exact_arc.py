@@ -26,8 +26,9 @@ class ExactArcInput(Part):
 
     1. ``from`` = start seen from the centre, ``to`` = the end, complemented; in the clock after
        that (``coded``) ``first_past`` = start − end, the quadrants, the signs and what is too far.
-    2. ``seen_x``, ``seen_y`` = −XH, YH; the crossings, the fault and the directions.
-    3. ``ready_diagonal`` = YH − XH.
+    2. ``seen_x``, ``seen_y`` = −XH, YH; the crossings, without the ``seen_round`` that an end
+       behind the start in its own quadrant takes; the fault and the directions.
+    3. ``ready_diagonal`` = YH − XH; all crossings.
 
     - ``pending``: stage 3 holds a block, until ``take``; ``still``: it makes no step, because it is
       ``empty`` (start, end and centre are one point) or has a ``fault``: ``RANGE`` when a
@@ -97,7 +98,6 @@ class ExactArcInput(Part):
         self.quadrant = register("quadrant", 2)
         self.end_quadrant = register("end_quadrant", 2)
         self.minus = {a: register(f"minus_{a}") for a in "xy"}
-        self.stands = {a: register(f"still_{a}") for a in "xy"}
         self.too_far = register("too_far")
         self.at_center = register("at_center")
         self.to_center = register("to_center")
@@ -115,6 +115,7 @@ class ExactArcInput(Part):
             register(f"{stage}_y", unsigned(width))
         register("ready_diagonal", way_shape)
         register("ready_unit")
+        register("seen_round")
         self.registers = registers
 
     def elaborate(self, platform):
@@ -177,7 +178,6 @@ class ExactArcInput(Part):
                 self.end_quadrant.eq(last),
                 self.minus["x"].eq(Mux(first[0], self.seen_from["y"][-1], self.seen_from["x"][-1])),
                 self.minus["y"].eq(Mux(first[0], self.seen_from["x"][-1], self.seen_from["y"][-1])),
-                *[self.stands[a].eq((self.seen_from[a] ^ self.seen_to[a]).all()) for a in "xy"],
                 *[
                     self.first_past[a].eq(_sum(self.seen_from[a], self.seen_to[a], Const(1, 1)))
                     for a in "xy"
@@ -193,10 +193,11 @@ class ExactArcInput(Part):
             "y": self.quadrant[0] ^ self.quadrant[1] ^ self.clockwise,
         }
         crossings, once_round = Signal(2), Signal()
-        wrong = Cat(~self.stands[a] & ~(self.first_past[a][-1] ^ negative[a]) for a in "xy")
+        stands = {a: self.first_past[a] == 0 for a in "xy"}
+        wrong = Cat(~stands[a] & ~(self.first_past[a][-1] ^ negative[a]) for a in "xy")
         m.d.comb += [
             crossings.eq(self.end_quadrant - self.quadrant),
-            once_round.eq((crossings == 0) & (wrong.any() | (self.stands["x"] & self.stands["y"]))),
+            once_round.eq((crossings == 0) & (wrong.any() | (stands["x"] & stands["y"]))),
         ]
         # −X and Y, whatever the signs.
         flips = {"x": ~self.minus["x"], "y": self.minus["y"]}
@@ -216,7 +217,8 @@ class ExactArcInput(Part):
                 ),
                 r["seen_empty"].eq(self.at_center & self.to_center),
                 r["seen_swap"].eq(self.quadrant[0]),
-                r["seen_turns"].eq(Cat(crossings, self.full_turns + once_round)),
+                r["seen_turns"].eq(Cat(crossings, self.full_turns)),
+                r["seen_round"].eq(once_round),
             ]
             for a in "xy":
                 m.d.sync += [
@@ -231,9 +233,10 @@ class ExactArcInput(Part):
         with m.If(follow):
             for name, signal in r.items():
                 stage, _, rest = name.partition("_")
-                if stage == "ready" and rest not in ("held", "diagonal", "unit"):
+                if stage == "ready" and rest not in ("held", "turns", "diagonal", "unit"):
                     m.d.sync += signal.eq(r[f"seen_{rest}"])
             m.d.sync += [
+                r["ready_turns"].eq(r["seen_turns"] + Cat(Const(0, 2), r["seen_round"])),
                 r["ready_diagonal"].eq(x + y),
                 r["ready_unit"].eq((x == -1) & (y == 0)),
             ]

@@ -467,9 +467,16 @@ class ExactConic(Part):
             m.d.comb += multiplies.eq((tick != 0) & (tick < n + 2))
             with m.If(multiplies):
                 m.d.sync += [p.eq(p.rotate_left(1)) for p in (self.next_x, self.next_y)]
+                # The first bits are signs: what they stand for is taken off.
+                off = tick == 1
                 for g, x_scale, y_scale in ((gx, a << 1, b), (gy, b, c << 1)):
-                    digit = Mux(self.next_x[n], x_scale, 0) + Mux(self.next_y[n], y_scale, 0)
-                    m.d.sync += g.eq((g << 1) + Mux(tick == 1, -digit, digit))
+                    digits = [Signal.like(g, name=f"{g.name}_digit_{k}") for k in "xy"]
+                    m.d.comb += [
+                        digits[0].eq(Mux(self.next_x[n], x_scale, 0)),
+                        digits[1].eq(Mux(self.next_y[n], y_scale, 0)),
+                    ]
+                    turned = [digit ^ off.replicate(len(g)) for digit in digits]
+                    m.d.sync += g.eq(_three(Cat(off, g)[: len(g)], *turned, off))
             with m.If(tick == n + 2):
                 m.d.sync += [
                     self.next_p3.eq(self.next_p3 - self.next_x),
@@ -548,6 +555,12 @@ class ExactConic(Part):
             self.next_steep.eq(~leads_x),
             self.next_slows.eq(x_slows ^ leads_x),
         ]
+
+
+def _three(a: Value, b: Value, c: Value, carry: Value) -> Value:
+    """Add three numbers of as many bits, and a carry, with one carry chain."""
+    carries = Cat(carry, (a & b) | (a & c) | (b & c))
+    return ((a ^ b ^ c) + carries)[: len(a)]
 
 
 def _opposed(opposed: Value, value: Value) -> Value:

@@ -1529,7 +1529,7 @@ def done_before_the_last_step_is_taken(core: ExactLine) -> None:
     _amend(core, change)
 
 
-@_exact_line({*ALL} - {DOCUMENTS})
+@_exact_line({*ALL} - {DOCUMENTS, COMPILED})
 def place_before_the_step_is_taken(core: ExactLine) -> None:
     """P3 counts in every clock in which a step of x waits."""
     r = core.registers

@@ -77,7 +77,7 @@ class ExactArc:
         kinds |= dict.fromkeys(points, (n + 2, True)) | self._ends("first")
         kinds |= {"clockwise": (1, False), "full_turns": (FULL_TURNS_BITS, False)}
         kinds |= dict.fromkeys(("quadrant", "end_quadrant"), (2, False))
-        flags = ("minus_x", "minus_y", "still_x", "still_y", "too_far", "at_center", "to_center")
+        flags = ("minus_x", "minus_y", "too_far", "at_center", "to_center")
         kinds |= dict.fromkeys(flags, (1, False))
         for stage in ("seen", "ready"):
             kinds |= {f"{stage}_held": (1, False), f"{stage}_fault": (2, False)}
@@ -85,7 +85,8 @@ class ExactArc:
             kinds |= {f"{stage}_{name}": (1, False) for name in names}
             kinds |= {f"{stage}_turns": (TURNS_BITS, False)} | self._ends(stage)
             kinds |= {f"{stage}_x": (n + 1, True), f"{stage}_y": (n, False)}
-        return kinds | {"ready_diagonal": (n + 2, True), "ready_unit": (1, False)}
+        kinds |= {"ready_diagonal": (n + 2, True), "ready_unit": (1, False)}
+        return kinds | {"seen_round": (1, False)}
 
     def _ends(self, stage: str) -> dict[str, tuple[int, bool]]:
         """Give a stage's registers for the way to the end and the end."""
@@ -306,6 +307,8 @@ class ExactArc:
         after |= {name: where(leave, value, state[name]) for name, value in seen.items()}
         names = [name for name in self.prepared_registers() if name.startswith("ready_")]
         ready = {name: state[name.replace("ready", "seen")] for name in names[1:-2]}
+        turns = state["seen_turns"] + 4 * state["seen_round"]
+        ready["ready_turns"] = turns & (2**TURNS_BITS - 1)
         ready["ready_diagonal"] = state["seen_y"] + state["seen_x"]
         ready["ready_unit"] = equal(state["seen_x"], -1) & equal(state["seen_y"], 0)
         return after | {name: where(follow, value, state[name]) for name, value in ready.items()}
@@ -349,7 +352,6 @@ class ExactArc:
             "end_quadrant": quadrants[1],
             "minus_x": where(swap, minus["y"], minus["x"]),
             "minus_y": where(swap, minus["x"], minus["y"]),
-            **{f"still_{a}": equal(state[f"from_{a}"], ~state[f"to_{a}"]) for a in "xy"},
             **{f"first_past_{a}": self._past(state, a) for a in "xy"},
             "too_far": too_far,
             "at_center": zero["from"],
@@ -368,10 +370,11 @@ class ExactArc:
         # In quadrants I and II x falls; in II and III y does, the other way when mirrored.
         negative = {"x": less(first, 2), "y": equal((first + 1) >> 1, 1) ^ clockwise}
         ahead: Value = 1
+        still = {a: equal(state[f"first_past_{a}"], 0) for a in "xy"}
         for a in "xy":
             wrong = equal(less(state[f"first_past_{a}"], 0), negative[a])
-            ahead = ahead & (state[f"still_{a}"] | negate(wrong))
-        ahead = ahead & negate(state["still_x"] & state["still_y"])
+            ahead = ahead & (still[a] | negate(wrong))
+        ahead = ahead & negate(still["x"] & still["y"])
         crossings = (state["end_quadrant"] - first) & 3
         round_ = equal(crossings, 0) & negate(ahead)
         x, y = (where(swap, state[f"from_{b}"], state[f"from_{a}"]) for a, b in ("xy", "yx"))
@@ -382,7 +385,8 @@ class ExactArc:
             "swap": swap,
             "negative_x": negative["x"],
             "negative_y": negative["y"],
-            "turns": 4 * (state["full_turns"] + round_) + crossings,
+            "turns": 4 * state["full_turns"] + crossings,
+            "round": round_,
             "x": self._signed(where(state["minus_x"], x, 0 - x), self.width + 1),
             "y": where(state["minus_y"], 0 - y, y) & (2**self.width - 1),
             **{name[6:]: state[name] for name in self._ends("first")},

@@ -607,7 +607,8 @@ def _prepared(golden: ExactArc) -> Exhaustive:
                 fault = np.where(far, RANGE, np.where(zero & ~empty, OFF_CURVE, 0))
                 wrong = seen["seen_fault"] != fault
                 turns = crossings(blocks)
-                wrong |= (fault == 0) & ~empty & (seen["seen_turns"] != turns) & ahead_known(blocks)
+                told = seen["seen_turns"] + 4 * seen["seen_round"]
+                wrong |= (fault == 0) & ~empty & (told != turns) & ahead_known(blocks)
                 if wrong.any():
                     return str(blocks[wrong.argmax()].tolist())
         return ""

@@ -201,13 +201,13 @@ FLAWS = [
         "once round forgotten",
         "prepared:",
         "_see",
-        lambda at: {"seen_turns": at.after["seen_turns"] & 3},
+        lambda at: {"seen_round": at.after["seen_round"] & 0},
     ),
     Flaw(
         "an end on an axis in the quadrant after it",
         "prepared:",
         "_code",
-        lambda at: {"end_quadrant": (at.after["end_quadrant"] + at.after["still_x"]) & 3},
+        lambda at: {"end_quadrant": (at.after["end_quadrant"] + at.after["minus_x"]) & 3},
     ),
 ]
 
