@@ -142,10 +142,8 @@ def _send(
     status = host.open()
     if status.reason is StopReason.STOP or (clear and status.reason is not StopReason.NONE):
         status = host.clear()
-    if status.reason is not StopReason.NONE:
-        raise LinkError(
-            f"the machine stands still: {status.reason.name}; see to it, and give --clear"
-        )
+    if (reason := status.reason.name) != StopReason.NONE.name:
+        raise LinkError(f"the machine stands still: {reason}; see to it, and give --clear")
     if status.held:
         host.command("RESUME")
     host.set(job.drive.controls)
