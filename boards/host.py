@@ -5,7 +5,6 @@ queue has room, sends again what was damaged or lost, and knows from the board's
 taken, what it has done, and where the machine stands.
 """
 
-import random
 import time
 from binascii import crc32
 from collections import deque
@@ -46,6 +45,7 @@ _PATIENCE = 3.0
 _POLL = 0.005
 #: Numbers are counted modulo this; frames on their way are fewer than half of it.
 _NUMBERS = 256
+_LAST_SESSION = 255
 _MAX_WINDOW = 127
 #: Frames that are on their way at least, so that the line does not wait for the answer.
 _LEAST_AHEAD = 3.0
@@ -285,17 +285,19 @@ class Host:
     def open(self) -> Status:
         """Begin a session, whatever was before; give the board's first answer.
 
-        The numbers go on where the board is. Two greetings, each with a number of its own: an
-        answer to the second one can be no old one that was still on its way.
+        The numbers go on where the board is. Two greetings, each with a number that the last
+        session had not: an answer to the second one can be no old one that was still on its way.
 
         Raises
         ------
         LinkError
             No board answers, or one that is built for other blocks.
         """
-        first, second = random.sample(range(1, _NUMBERS), 2)
-        self._greet(first)
-        status = self._greet(second)
+        before = self._greet("QUERY", 0, b"", lambda _: True)
+        first = before.session % _LAST_SESSION + 1
+        second = first % _LAST_SESSION + 1
+        for session in (first, second):
+            status = self._greet("HELLO", session, self._fingerprint, session.__eq__)
         self._session = second
         self._frames.clear()
         self._first, self._command = status.next_block, status.next_command
@@ -304,17 +306,19 @@ class Host:
         self._done_before = status.done
         return self.status
 
-    def _greet(self, session: int) -> Status:
-        """Say hello until the answer has the session's number."""
+    def _greet(
+        self, kind: str, number: int, payload: bytes, right: Callable[[int], bool]
+    ) -> Status:
+        """Send a frame until the answer has the right session."""
         answered = False
         began = self._clock()
         while self._clock() - began < _PATIENCE:
-            self._write("HELLO", session, self._fingerprint)
+            self._write(kind, number, payload)
             until = self._clock() + self._timeout
             while self._clock() < until:
                 for status in self._read():
                     answered = True
-                    if status.session == session:
+                    if right(status.session):
                         return status
         if answered or self._reader.foreign:
             raise LinkError(

@@ -1539,7 +1539,7 @@ def _exact_device(width: int, axes: int, kinds: tuple[str, ...], used: list[str]
     show_default=True,
     help="What the board draws, as it was built: of line, arc and conic.",
 )
-@click.option("--baud", type=click.IntRange(300), help="Of the port. [default: 115200]")
+@click.option("--baud", type=click.IntRange(1200), help="Of the port. [default: 115200]")
 @click.option(
     "--clear",
     is_flag=True,

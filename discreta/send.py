@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from discreta.boards.host import Host, LinkError, Status
+from discreta.boards.host import Host, LinkError, Status, StoppedError
 from discreta.hdl.controller import Controller
 from discreta.hdl.device import Device
 from discreta.hdl.plain import block_fields
@@ -28,6 +28,8 @@ SIMULATED = "sim:"
 
 #: Seconds that a read of a port waits for the first byte.
 _READ = 0.002
+#: Seconds, or bits, in which an answer comes to what was sent: two frames, and their way.
+_TIMEOUT, _TIMEOUT_BITS = 0.1, 1500
 
 Progress = Callable[[int, int], object]
 
@@ -79,7 +81,7 @@ def send(
     BadInputError
         There is no such port.
     LinkError
-        The board does not answer as it should, or the machine has stopped.
+        The board does not answer as it should, or the machine stands still and is not cleared.
     """
     serial = _pyserial()
     try:
@@ -88,7 +90,8 @@ def send(
         raise BadInputError(f"cannot open {port}: {error}") from None
     with line, _interrupts() as interrupted:
         try:
-            return _send(job, Host(line, *_format(job.device)), clear, progress, interrupted)
+            host = Host(line, *_format(job.device), timeout=max(_TIMEOUT, _TIMEOUT_BITS / baud))
+            return _send(job, host, clear, progress, interrupted)
         except serial.SerialException as error:
             raise LinkError(f"the port {port} is gone: {error}") from None
 
@@ -139,21 +142,20 @@ def _send(
     status = host.open()
     if status.reason is StopReason.STOP or (clear and status.reason is not StopReason.NONE):
         status = host.clear()
-    if status.reason is not StopReason.NONE:
-        raise LinkError(
-            f"the machine stands still: {status.reason.name}; see to it, and give --clear"
-        )
+    if (reason := status.reason.name) != StopReason.NONE.name:
+        raise LinkError(f"the machine stands still: {reason}; see to it, and give --clear")
     if status.held:
         host.command("RESUME")
     host.set(job.drive.controls)
     try:
         host.send(job.blocks.tolist(), follow)
         status = host.wait(follow)
-        seconds = time.monotonic() - began
+    except StoppedError:
+        status = host.wait()
     except _Interrupted:
         host.command("STOP")
         status = host.wait()
-        seconds = time.monotonic() - began
+    seconds = time.monotonic() - began
     return {
         "blocks": total,
         "blocks done": status.done,

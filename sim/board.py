@@ -63,7 +63,7 @@ class Board:
     controller : Controller
     watch : callable or None
         Called with every change of the pins, in order.
-    clocks_per_bit : Fraction or None
+    clocks_per_bit : Fraction, int or None
         Length of a bit on the line; None: the controller's own.
 
     Attributes
@@ -84,7 +84,7 @@ class Board:
         controller: Controller,
         *,
         watch: Watch | None = None,
-        clocks_per_bit: Fraction | None = None,
+        clocks_per_bit: Fraction | int | None = None,
     ):
         top = PlainPorts(controller)
         self.clock = self.waiting = 0

@@ -9,6 +9,7 @@ from discreta.hdl.contract import AXIS_LETTERS
 from discreta.hdl.queue import KINDS, BlockKind
 from discreta.sim.golden.constant_speed import constant_arc, constant_line
 from discreta.sim.golden.exact_conic import ExactConic
+from discreta.sim.points import BadInputError
 
 __all__ = ["RefusedBlockError", "expected_points"]
 
@@ -24,7 +25,7 @@ _PLACE = BlockKind.__members__["PLACE"].value
 _CLOCKS_PER_STEP, _CLOCKS = 4, 1000
 
 
-class RefusedBlockError(ValueError):
+class RefusedBlockError(BadInputError):
     """The golden model refuses a block, or does not end; the message names it."""
 
 

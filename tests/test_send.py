@@ -197,3 +197,18 @@ def test_bad_input(discreta, folder, words, said):
     assert err.startswith("discreta: ")
     assert err.count("\n") == 1
     assert sorted(folder.iterdir()) == before
+
+
+def test_a_machine_that_stops_on_its_way_is_told_with_its_place(discreta):
+    plotter = Plotter(POINTS[0], PulseTiming(2, 2, 3, 3))
+    board = Board(Controller(exact_device(8), 8), watch=plotter.follow)
+    board.switch("high_limit_y", 1)
+    terminal = BoardTerminal(board)
+    try:
+        code, out, err = discreta("send", terminal.name, *PATH[2:])
+    finally:
+        terminal.close()
+    assert (code, err) == (1, "")
+    said = table(out)
+    assert (said["stopped"], said["position"]) == ("LIMIT", "100,0")
+    assert plotter.position.tolist() == [100, 0]

@@ -253,7 +253,9 @@ def test_a_block_is_handed_over_once_as_it_was_sent_and_acknowledged():
     bench_of(story, kinds=("line", "arc"))
 
 
-@pytest.mark.parametrize("what", ["number", "checksum", "length", "error", "cut", "no session"])
+@pytest.mark.parametrize(
+    "what", ["number", "checksum", "length", "error", "noise", "cut", "no session"]
+)
 def test_a_block_that_is_not_whole_and_next_is_dropped(what):
     async def story(bench, ctx):
         if what != "no session":
@@ -266,6 +268,8 @@ def test_a_block_that_is_not_whole_and_next_is_dropped(what):
             data = data[:9] + data[10:]
         bench.answers.clear()
         for place, byte in enumerate(data):
+            if what == "noise" and place == 5:
+                await bench.clocks(ctx, bytes_data=byte, bytes_valid=1, bytes_error=1)
             error = int(what == "error" and place == 5)
             await bench.clocks(ctx, bytes_data=byte, bytes_valid=1, bytes_error=error)
         await bench.clocks(ctx, 100)
