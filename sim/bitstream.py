@@ -7,6 +7,7 @@ Source: none, it is ours.
 """
 
 import json
+import re
 import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -37,6 +38,9 @@ SEEDS = (1, 2, 3, 4, 5)
 
 #: Processes of a build that meets its clock at once.
 RUNS = 3
+
+#: What nextpnr says where it is nearly full: another seed may find a place.
+_CROWDED = re.compile("legal placement|place chain|expand region")
 
 #: What a placement may take: many times what it does, so that it never depends on the machine
 #: which one is the first that comes to an end. nextpnr can go on for ever.
@@ -135,9 +139,12 @@ def build(
             except TimeoutError:
                 reached[seed] = "no end"
                 continue
-            except SynthesisError:
+            except SynthesisError as error:
                 _check_room(chosen, folder)
-                raise
+                if not _CROWDED.search(str(error)):
+                    raise
+                reached[seed] = "no place for all cells"
+                continue
             report = json.loads(Path(folder, "report.json").read_text())
             fmax = min(clock["achieved"] for clock in report["fmax"].values())
             if fmax < clock:

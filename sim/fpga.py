@@ -169,6 +169,9 @@ module lut3 (input I0, I1, I2, output F);
 endmodule
 """
 
+# Where it is nearly full, many enables of a few flip-flops each can hardly be placed.
+_FEW_ENABLES = "-dffe_min_ce_use 8"
+
 _HX8K = Fpga(
     name="hx8k",
     title="Lattice iCE40 HX8K",
@@ -200,15 +203,14 @@ FPGAS = {
             _HX8K,
             name="hx1k",
             title="Lattice iCE40 HX1K",
-            # Where it is nearly full, many enables of a few flip-flops each cannot be placed.
-            synthesis="synth_ice40 -device hx -dffe_min_ce_use 8",
+            synthesis=f"synth_ice40 -device hx {_FEW_ENABLES}",
             options=("--hx1k", "--package", "tq144"),
         ),
         replace(
             _HX8K,
             name="up5k",
             title="Lattice iCE40 UP5K",
-            synthesis="synth_ice40 -device u -dsp",
+            synthesis=f"synth_ice40 -device u -dsp {_FEW_ENABLES}",
             options=("--up5k", "--package", "sg48"),
         ),
         Fpga(

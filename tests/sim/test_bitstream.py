@@ -90,6 +90,9 @@ def _reports(monkeypatch, fmax):
                 reached = fmax[int(command[command.index("--seed") + 1])]
                 if reached is None:
                     raise TimeoutError
+                if isinstance(reached, str):
+                    (self.folder / "0.log").write_text("SB_IO: 2/ 96\n")
+                    raise SynthesisError(reached)
                 report = {"fmax": {"clk": {"achieved": reached}}}
                 (self.folder / "report.json").write_text(json.dumps(report))
                 self.reached = reached
@@ -114,6 +117,17 @@ def test_every_seed_that_does_not_is_named(monkeypatch):
         made(seeds=(1, 2))
     said = "it does not reach its clock of 12 MHz: 11.99 MHz with seed 1, no end with seed 2"
     assert str(error.value) == said
+
+
+def test_another_seed_may_find_a_place(monkeypatch):
+    crowded = "Unable to find legal placement for all cells, design is probably at its limit."
+    _reports(monkeypatch, {1: crowded, 2: 12.5})
+    assert made(seeds=(1, 2)).seed == 2
+    said = "it does not reach its clock of 12 MHz: no place for all cells with seed 1"
+    assert_refused((SynthesisError, said), made)
+    # Any other complaint is the same with every seed.
+    _reports(monkeypatch, {1: "cell 'q' is no pin", 2: 12.5})
+    assert_refused((SynthesisError, "cell 'q' is no pin"), lambda: made(seeds=(1, 2)))
 
 
 @needs_boards
