@@ -15,6 +15,7 @@ from fractions import Fraction
 from functools import partial
 from importlib import metadata
 from io import TextIOWrapper
+from pathlib import Path
 from typing import Any, NoReturn, cast
 
 import click
@@ -40,10 +41,12 @@ from discreta.hdl.contract import (
 from discreta.hdl.harness import LoneAccumulator
 from discreta.hdl.parts import PRELOADS
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
+from discreta.hdl.plain import PlainPorts
 from discreta.hdl.verilog import verilog as emit_verilog
 from discreta.sim.carrier import DEFAULT_PERIOD, DEFAULT_SPEED, MAX_PERIOD
 from discreta.sim.compiled import compiler
 from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
+from discreta.sim.corefile import core_file
 from discreta.sim.curves import Arc, Conic, Curve, Polyline
 from discreta.sim.machine import Drive
 from discreta.sim.methods import METHODS, Design, Method
@@ -749,18 +752,51 @@ def _out(*, err: bool = False) -> Console:
 @_axes
 @_setting_options
 @click.option("--output", metavar="FILE.v", default="-", help="[default: standard output]")
-def verilog(method: Design, width: int, axes: int, setting: str, output: str, **given: Any) -> None:
+@click.option(
+    "--testbench",
+    is_flag=True,
+    help="Write a self-checking test bench with golden vectors beside it, FILE_tb.v.",
+)
+@click.option(
+    "--core", is_flag=True, help="Write a FuseSoC core file beside it, FILE.core, for both."
+)
+def verilog(
+    method: Design,
+    width: int,
+    axes: int,
+    setting: str,
+    output: str,
+    testbench: bool,
+    core: bool,
+    **given: Any,
+) -> None:
     """Write a method as Verilog-2005 with plain ports, or the whole device, or a unit of it.
 
     These are device (lines, arcs and conics from one queue to the pins of the motor drivers), feed
-    and pulse.
+    and pulse. The test bench runs in any simulator that knows $fatal, and prints PASS or FAIL.
 
-    Example: discreta verilog linear --width 16 --output linear.v
+    Example: discreta verilog linear --width 16 --output linear.v --testbench
     """
     make = _maker(method, width, axes, setting, given)
+    name = f"discreta_{method.name}"
+    for option, on in (("testbench", testbench), ("core", core)):
+        if on and output == "-":
+            raise BadInputError(f"--{option} is written beside the core: give --output FILE.v")
+    file = Path(output)
+    bench_file = file.with_name(f"{file.stem}_tb.v")
     with Outputs() as outputs:
-        file = outputs.open(output)
-        file.write(emit_verilog(make(), f"discreta_{method.name}"))
+        outputs.open(output).write(emit_verilog(top := PlainPorts(make()), name))
+        if testbench:
+            from discreta.sim.testbench import testbench as write_bench
+            from discreta.sim.vectors import golden_vectors
+
+            golden = method.model(width, axes, **_chosen(method, setting, given))
+            vectors = golden_vectors(method, top, golden)
+            outputs.open(str(bench_file)).write(write_bench(top, name, vectors))
+        if core:
+            bench = bench_file.name if testbench else None
+            text = core_file(method.name, method.summary, name, file.name, bench)
+            outputs.open(str(file.with_suffix(".core"))).write(text)
 
 
 @cli.command("synth", short_help="Measure cells and clock speed on an FPGA.")

@@ -12,6 +12,7 @@ from discreta.hdl.pulse import KINDS as PIN_KINDS
 from discreta.hdl.pulse import PulseUnit
 from discreta.sim.golden.device import make_device as golden_device
 from discreta.sim.golden.feed import FeedUnit as GoldenFeedUnit
+from discreta.sim.golden.fifo import QueuedDevice
 from discreta.sim.golden.pulse import PulseUnit as GoldenPulseUnit
 from discreta.sim.methods import Design
 
@@ -30,9 +31,9 @@ def make_device(width: int, *, kinds: tuple[str, ...], depth: int, **choices: An
 
 
 def _golden_device(width: int, *, kinds: tuple[str, ...], depth: int) -> Any:
-    """Make the golden model; that of a longer queue is not written."""
-    assert depth == 1
-    return golden_device(width, kinds)
+    """Make the golden model; that of a longer queue runs on integers alone."""
+    device = golden_device(width, kinds)
+    return device if depth == 1 else QueuedDevice(device, depth)
 
 
 UNITS = {

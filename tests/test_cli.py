@@ -618,6 +618,17 @@ def test_verilog_of_a_setting(discreta, words, core):
     assert re.findall(r"^module (\w+)", out, re.MULTILINE)[0] == f"discreta_{words[0]}"
 
 
+def test_verilog_with_its_bench_and_core_file(discreta, folder):
+    options = ["--width", "5", "--preload", "zero", "--output", "line.v", "--testbench", "--core"]
+    assert discreta("verilog", "linear", *options) == (0, "", "")
+    assert sorted(snapshot(folder)) == ["line.core", "line.v", "line_tb.v"]
+    assert (folder / "line.v").read_text() == verilog(Linear(5, preload="zero"), "discreta_linear")
+    assert "module discreta_linear_tb;" in (folder / "line_tb.v").read_text()
+    assert "line_tb.v" in (folder / "line.core").read_text()
+    assert discreta("verilog", "linear", "--output", "a.v", "--core") == (0, "", "")
+    assert "tb" not in (folder / "a.core").read_text()
+
+
 def test_on_a_carrier(discreta, folder):
     """A number as a decimal or a fraction, and the picture has a panel more."""
     timing = ["--period", "50", "--trace", "-", *PYSIM, "--width", "6", "--plot", "p.svg"]
@@ -1233,6 +1244,14 @@ BAD = {
     "verilog": (
         ["verilog", "linear", "--output", "no/a.v"],
         "cannot write no/a.v: there is no folder no; make it first",
+    ),
+    "test bench of the standard output": (
+        ["verilog", "linear", "--testbench"],
+        "--testbench is written beside the core: give --output FILE.v",
+    ),
+    "core file of the standard output": (
+        ["verilog", "linear", "--core"],
+        "--core is written beside the core: give --output FILE.v",
     ),
     "picture": (
         [*LINE, "--plot", "p.pdf"],
