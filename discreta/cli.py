@@ -48,6 +48,7 @@ from discreta.sim.compiled import compiler
 from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
 from discreta.sim.corefile import core_file
 from discreta.sim.curves import Arc, Conic, Curve, Polyline
+from discreta.sim.foreign import available
 from discreta.sim.machine import Drive
 from discreta.sim.methods import METHODS, Design, Method
 from discreta.sim.outputs import Outputs
@@ -960,7 +961,10 @@ def compare_command(methods: tuple[Method, ...], width: int, device: str) -> Non
 )
 @_width
 @_one_setting
-def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
+@click.option(
+    "--verilog", is_flag=True, help="Prove instead that the Verilog, read again, is the RTL."
+)
+def prove(methods: tuple[Design, ...], width: int, setting: str | None, verilog: bool) -> None:
     """Prove a method: RTL = golden model, and its promises, for every block of a width.
 
     Or a unit of the device: feed, pulse, or the device itself, with a queue of one block.
@@ -972,7 +976,7 @@ def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
     Example: discreta prove linear --width 32
     """
     try:
-        from discreta.sim.prover import prove_variant, shares
+        from discreta.sim.prover import prove_variant, prove_verilog, shares
     except ModuleNotFoundError as error:
         raise BadInputError(
             f"proofs need {error.name}: install the extra, pip install 'discreta[prove]'"
@@ -983,14 +987,17 @@ def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
     jobs = [
         (method, variant)
         for method in methods
-        for variant in [*([None] if shares(method.name) else []), *_variants(method, setting)]
+        for variant in [
+            *([None] if shares(method.name) and not verilog else []),
+            *_variants(method, setting),
+        ]
     ]
     good = True
     began = time.perf_counter()
     count = {"proven": 0, "checked": 0}
     with ProcessPoolExecutor(min(len(jobs), os.cpu_count() or 1)) as pool:
         results = pool.map(
-            prove_variant,
+            prove_verilog if verilog else prove_variant,
             [method.name for method, _ in jobs],
             [width] * len(jobs),
             [variant for _, variant in jobs],
@@ -1017,6 +1024,74 @@ def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
     counted += f"{count['checked']} checked in every case, " if count["checked"] else ""
     out.print(f"{counted}{'all hold' if good else 'NOT ALL HOLD'}, {seconds:.1f} s")
     if not good:
+        raise click.exceptions.Exit(1)
+
+
+@cli.command("netlist", short_help="Simulate and prove the netlist for an iCE40.")
+@click.argument("methods", type=_MethodName(), nargs=-1, required=True, metavar="METHOD...")
+@_width
+@_one_setting
+@click.option(
+    "--prove/--no-prove",
+    default=True,
+    show_default=True,
+    help="Whether to prove the netlist equal to the RTL, for all states and inputs.",
+)
+def netlist_command(
+    methods: tuple[Method, ...], width: int, setting: str | None, prove: bool
+) -> None:
+    """Synthesize methods for the iCE40, and show that the netlist is the method still.
+
+    Golden vectors run through the netlist in Icarus, with Yosys' models of the cells, and every
+    output is compared at every clock; then one clock of netlist and RTL is proven equal, from all
+    states. Without --setting that of the default. Exits 1 when something differs or is not proven.
+
+    Example: discreta netlist linear circular exact_line exact_arc --width 16
+    """
+    try:
+        from discreta.sim.equal import netlist, simulate_netlist
+        from discreta.sim.prover import prove_netlist
+    except ModuleNotFoundError as error:
+        raise BadInputError(
+            f"netlists need {error.name}: install the extra, pip install 'discreta[prove]'"
+        ) from None
+    if reason := available("icarus"):
+        raise BadInputError(reason)
+    for method in methods:
+        _check_width(method, width)
+    table = _table(("method", "LUTs", "carries", "flip-flops", "simulated", "proven"))
+    findings = []
+    with _progress("methods") as show:
+        show(0, len(methods))
+        for done, method in enumerate(methods, start=1):
+            choices = _chosen(method, setting or "default", {})
+            try:
+                cells = netlist(method.core(width, **choices), "core").cells
+                same, said = simulate_netlist(method, width, choices)
+                verdicts = prove_netlist(method.name, width, choices) if prove else []
+            except (SynthesisError, RuntimeError) as error:
+                raise SynthesisError(f"{method.name}: {error}") from None
+            wrong = [it for it in verdicts if not it.holds]
+            findings += [f"{method.name}: {said}"] if not same else []
+            findings += [f"{method.name}: {it.title}: {it.counterexample}" for it in wrong]
+            table.add_row(
+                method.name,
+                *(
+                    str(sum(count for cell, count in cells.items() if cell.startswith(kind)))
+                    for kind in ("SB_LUT4", "SB_CARRY", "SB_DFF")
+                ),
+                said.splitlines()[0].partition(", ")[2] if same else "DIFFERS",
+                ("NOT PROVEN" if wrong else f"{sum(it.seconds for it in verdicts):.1f} s")
+                if prove
+                else "-",
+            )
+            show(done, len(methods))
+    out = _out()
+    out.print(f"Lattice iCE40, width {width}")
+    out.print(table)
+    for finding in findings:
+        click.echo(finding, err=True)
+    if findings:
         raise click.exceptions.Exit(1)
 
 
