@@ -47,6 +47,7 @@ __all__ = [
     "cell_models",
     "netlist",
     "netlist_equivalence",
+    "run_yosys",
     "simulate_netlist",
     "verilog_equivalence",
 ]
@@ -63,8 +64,14 @@ _TO_SMT = (
 )
 
 
-def _run(files: Mapping[str, str], commands: Iterable[str], *wanted: str) -> list[str]:
-    """Run commands of Yosys in a folder with some files, and give texts that it writes there."""
+def run_yosys(files: Mapping[str, str], commands: Iterable[str], *wanted: str) -> list[str]:
+    """Run commands of Yosys in a folder with some files, and give texts that it writes there.
+
+    Raises
+    ------
+    SynthesisError
+        It says that something is wrong.
+    """
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         for name, text in files.items():
@@ -129,7 +136,7 @@ def netlist(core: Part, module: str) -> Netlist:
         "write_verilog -noattr netlist.v",
     )
     design = {"core.il": rtlil.convert(top, name=module, emit_src=False)}
-    text, named, made = _run(design, commands, "netlist.v", "named.json", "made.json")
+    text, named, made = run_yosys(design, commands, "netlist.v", "named.json", "made.json")
     wires, flip_flops = (json.loads(named)["modules"][module][of] for of in ("netnames", "cells"))
     holders: dict[Any, str | int] = {"0": 0, "1": 1}
     for name, cell in flip_flops.items():
@@ -174,7 +181,7 @@ def netlist_equivalence(core: Part, made: Netlist | None = None) -> list[Obligat
         "read_verilog -defer -D ICE40_HX -D NO_ICE40_DEFAULT_ASSIGNMENTS +/ice40/cells_sim.v",
         *_commands(),
     ]
-    (smt,) = _run({"netlist.v": made.text}, commands, "out.smt2")
+    (smt,) = run_yosys({"netlist.v": made.text}, commands, "out.smt2")
     values = {}
     for name, bits in made.registers.items():
         # No flip-flop of an iCE40 starts from 1: such a one holds its bit inverted.
@@ -221,7 +228,7 @@ def verilog_equivalence(core: Part, text: str | None = None) -> list[Obligation]
     """
     text = verilog(core, "other") if text is None else text
     commands = ["read_verilog design.v", *_commands()]
-    (smt,) = _run({"design.v": text}, commands, "out.smt2")
+    (smt,) = run_yosys({"design.v": text}, commands, "out.smt2")
     wires, held = _wires(smt)
     found: dict[str, _Place] = {}
     for name, (parts, aliases) in _aliases(core).items():
@@ -271,7 +278,7 @@ def _paths(core: Part) -> dict[str, tuple[str, ...]]:
 def _aliases(core: Part) -> dict[str, tuple[tuple[str, ...], set[str]]]:
     """Give the instances that lead to every register, and all names it has in its module."""
     design = {"core.il": rtlil.convert(PlainPorts(core), name="other", emit_src=False)}
-    (text,) = _run(design, ("read_rtlil core.il", "proc", "write_json core.json"), "core.json")
+    (text,) = run_yosys(design, ("read_rtlil core.il", "proc", "write_json core.json"), "core.json")
     modules = json.loads(text)["modules"]
     found = {}
     for name, (*parts, last) in _paths(core).items():

@@ -25,8 +25,10 @@ __all__ = [
     "SIMULATORS",
     "UnknownOutputError",
     "available",
+    "build_icarus",
     "lint",
     "run_foreign",
+    "run_program",
     "run_testbench",
 ]
 
@@ -254,18 +256,44 @@ def run_testbench(text: str, bench: str, name: str, simulator: str) -> tuple[int
         raise RuntimeError(reason)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        (folder / "design.v").write_text(text)
-        (folder / "bench.v").write_text(bench)
         if simulator == "icarus":
-            options = ["-g2005", "-s", name, "-o", "bench"]
-            _run(["iverilog", *options, "bench.v", "design.v"], folder)
+            build_icarus(folder, text, bench, name, "bench")
             command = ["vvp", "-n", "bench"]
         else:
+            (folder / "design.v").write_text(text)
+            (folder / "bench.v").write_text(bench)
             options = ["--cc", "--main", "--timing", "-Wno-fatal", "--top-module", name]
             options += ["--prefix", "Vbench", "bench.v", "design.v"]
             flags = ["-std=c++20", "-fcoroutines"]
             command = _compile_verilated(folder, options, _VERILATOR_BENCH, flags)
-        done = _call(command, folder)
+        return run_program(command, folder)
+
+
+def build_icarus(folder: Path, text: str, bench: str, name: str, program: str) -> None:
+    """Compile a core and a bench in Icarus, to a program in a folder.
+
+    Raises
+    ------
+    RuntimeError
+        Icarus is missing, or did not accept the texts.
+    """
+    if reason := available("icarus"):
+        raise RuntimeError(reason)
+    (folder / "design.v").write_text(text)
+    (folder / "bench.v").write_text(bench)
+    options = ["-g2005", "-s", name, "-o", program]
+    _run(["iverilog", *options, "bench.v", "design.v"], folder)
+
+
+def run_program(command: list[str], folder: Path) -> tuple[int, str]:
+    """Run a program in a folder, and give its exit code and what it prints.
+
+    Raises
+    ------
+    RuntimeError
+        It did not end in time.
+    """
+    done = _call(command, folder)
     return done.returncode, done.stdout + done.stderr
 
 

@@ -162,7 +162,7 @@ def golden_vectors(
     design : Design
         What it is: its blocks are of that kind.
     top : PlainPorts
-        Says which ports there are.
+        Says which ports there are; registers may be observed.
     golden : object
         The golden model of that very core.
     clocks : int
@@ -188,10 +188,10 @@ def golden_vectors(
     within = len(blocks) // 3
     rows, taken, end = [], 0, clocks
     played = play(golden, top.block_fields, blocks, stalls, resets, orders)
-    for clock, (_, out, inputs) in enumerate(islice(played, clocks)):
+    for clock, (state, out, inputs) in enumerate(islice(played, clocks)):
         if clock >= end:
             break
-        rows.append((out, inputs))
+        rows.append((out | {f"reg_{name}": value for name, value in state.items()}, inputs))
         if len(resets) == 1 and (taken > within or clock >= clocks // 2):
             resets |= {clock + _WITHIN, clock + _WITHIN + 1}
         if inputs["blocks_valid"] and out.get("blocks_ready") and not inputs["rst"]:
