@@ -73,6 +73,8 @@ from discreta.sim.synth import (
     check_tools,
     measure,
 )
+from discreta.sim.testbench import testbench as write_bench
+from discreta.sim.vectors import golden_vectors
 
 __all__ = ["main"]
 
@@ -760,6 +762,9 @@ def _out(*, err: bool = False) -> Console:
     help="Write a self-checking test bench with golden vectors beside it, FILE_tb.v.",
 )
 @click.option(
+    "--vectors", is_flag=True, help="Write these vectors beside it for cocotb, FILE.json."
+)
+@click.option(
     "--core", is_flag=True, help="Write a FuseSoC core file beside it, FILE.core, for both."
 )
 def verilog(
@@ -769,6 +774,7 @@ def verilog(
     setting: str,
     output: str,
     testbench: bool,
+    vectors: bool,
     core: bool,
     **given: Any,
 ) -> None:
@@ -781,20 +787,21 @@ def verilog(
     """
     make = _maker(method, width, axes, setting, given)
     name = f"discreta_{method.name}"
-    for option, on in (("testbench", testbench), ("core", core)):
+    beside = (("testbench", testbench), ("vectors", vectors), ("core", core))
+    for option, on in beside:
         if on and output == "-":
             raise BadInputError(f"--{option} is written beside the core: give --output FILE.v")
     file = Path(output)
     bench_file = file.with_name(f"{file.stem}_tb.v")
     with Outputs() as outputs:
         outputs.open(output).write(emit_verilog(top := PlainPorts(make()), name))
-        if testbench:
-            from discreta.sim.testbench import testbench as write_bench
-            from discreta.sim.vectors import golden_vectors
-
+        if testbench or vectors:
             golden = method.model(width, axes, **_chosen(method, setting, given))
-            vectors = golden_vectors(method, top, golden)
-            outputs.open(str(bench_file)).write(write_bench(top, name, vectors))
+            found = golden_vectors(method, top, golden)
+            if testbench:
+                outputs.open(str(bench_file)).write(write_bench(top, name, found))
+            if vectors:
+                json.dump(asdict(found), outputs.open(str(file.with_suffix(".json"))))
         if core:
             bench = bench_file.name if testbench else None
             text = core_file(method.name, method.summary, name, file.name, bench)

@@ -619,9 +619,10 @@ def test_verilog_of_a_setting(discreta, words, core):
 
 
 def test_verilog_with_its_bench_and_core_file(discreta, folder):
-    options = ["--width", "5", "--preload", "zero", "--output", "line.v", "--testbench", "--core"]
+    options = ["--width", "5", "--preload", "zero", "--output", "line.v"]
+    options += ["--testbench", "--vectors", "--core"]
     assert discreta("verilog", "linear", *options) == (0, "", "")
-    assert sorted(snapshot(folder)) == ["line.core", "line.v", "line_tb.v"]
+    assert sorted(snapshot(folder)) == ["line.core", "line.json", "line.v", "line_tb.v"]
     assert (folder / "line.v").read_text() == verilog(Linear(5, preload="zero"), "discreta_linear")
     assert "module discreta_linear_tb;" in (folder / "line_tb.v").read_text()
     assert "line_tb.v" in (folder / "line.core").read_text()
