@@ -1151,7 +1151,7 @@ def mutants_command(methods: tuple[Method, ...], width: int, count: int, seed: i
                     workers=os.cpu_count() or 1,
                     progress=show,
                 ):
-                    first[next(iter(verdict.caught), "")] += 1
+                    first[verdict.caught] += 1
                     good &= bool(verdict.caught) or verdict.same
                     if not verdict.caught:
                         left.append((method.name, verdict))

@@ -5,8 +5,10 @@ sets it to 0 or 1, or inverts it where another bit is 0 or 1; clocks are left al
 in one design with a selector, which is 0 for the core itself. Every one is tried
 
 - in Icarus, on the golden vectors of :mod:`discreta.sim.vectors`: the outputs at every clock, as in
-  the test bench of the Verilog, and every register besides, as in the simulations of the ladder;
-- by SMT: one clock of it is the core's, for all states and inputs, in every register and output.
+  the test bench of the Verilog; if they are right every register besides, as in the simulations of
+  the ladder;
+- then by SMT: one clock of it is the core's, for all states and inputs, in every register and
+  output.
 
 The last one leaves no doubt: a mutant is caught, or proven to be the same machine, in every state
 that there is. Such a one is no defect: what was changed makes no difference to anything.
@@ -72,19 +74,19 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the checks see of a mutant.
+    """What the checks see of a mutant, up to the first that catches it.
 
     Attributes
     ----------
     mutant : Mutant
-    caught : tuple of str
-        Those of :data:`CHECKS` that catch it.
+    caught : str
+        The first one of :data:`CHECKS` that catches it, or empty.
     same : bool
         It is proven to be the core.
     """
 
     mutant: Mutant
-    caught: tuple[str, ...]
+    caught: str
     same: bool
 
 
@@ -235,8 +237,7 @@ def judge(
         ) as pool:
             caught, same = next(pool.map(_try, [0]))
             if caught or not same:
-                what = ", ".join(caught) or "the solver gave up"
-                raise RuntimeError(f"{name} itself does not pass: {what}")
+                raise RuntimeError(f"{name} itself does not pass: {caught or 'the solver gave up'}")
             progress(0, len(jobs))
             results = pool.map(_try, jobs)
             found = zip(mutated.mutants, results, strict=True)
@@ -325,9 +326,11 @@ def _begin(name: str, width: int, choices: dict[str, Any], smt: str, folder: str
     _judge[:] = [_Judge((METHODS | UNITS)[name].core(width, **choices), smt, folder)]
 
 
-def _try(number: int) -> tuple[tuple[str, ...], bool]:
-    """Give the checks that catch a mutant, and whether it is the core; 0 is the core itself."""
+def _try(number: int) -> tuple[str, bool]:
+    """Give the first check that catches a mutant, and whether it is the core; 0 is the core."""
     (judge,) = _judge
-    caught = [what for what in (OUTPUTS, REGISTERS) if judge.simulated(number, what)]
+    for what in (OUTPUTS, REGISTERS):
+        if judge.simulated(number, what):
+            return what, False
     differs = judge.differs(number)
-    return (*caught, *([PROOF] if differs else [])), differs is False
+    return PROOF if differs else "", differs is False

@@ -62,7 +62,6 @@ def test_the_netlist_shows_what_the_golden_model_does(name):
     ("old", "new", "part"),
     [
         (r"\bsy <= total;", "sy <= total + 1'b1;", "every register"),
-        (r"\.steps__last\(steps_last\)", ".steps__last()", "every output"),
         (r"(reg \[5:0\] p3) = 6'h00", r"\1 = 6'h01", "it starts"),
     ],
 )
@@ -108,8 +107,10 @@ def test_a_fault_in_the_netlist_is_seen(what):
 
 
 def test_what_yosys_says_is_passed_on():
-    with pytest.raises(SynthesisError, match="ERROR: .*syntax error"):
-        verilog_equivalence(core_of("linear"), "module other(;\n")
+    core = core_of("linear")
+    text = verilog(core, "other").replace("endmodule", "endmodul", 1)
+    with pytest.raises(SynthesisError, match=r"ERROR: .*syntax error"):
+        verilog_equivalence(core, text)
 
 
 def test_every_bit_of_a_register_is_somewhere():
