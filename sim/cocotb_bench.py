@@ -26,7 +26,7 @@ __all__ = ["follow", "golden_vectors"]
 _HALF = 5
 
 
-async def follow(dut: Any, vectors: dict[str, dict[str, list[int | None]]]) -> int:
+async def follow(dut: Any, vectors: dict[str, dict[str, list]]) -> int:
     """Drive a core by vectors, compare every output at every clock, and give how many clocks.
 
     Parameters

