@@ -35,7 +35,9 @@ from discreta.hdl.linear import Linear
 from discreta.hdl.pulse import PulseUnit
 from discreta.hdl.quadrant import line_block_layout
 from discreta.hdl.verilog import verilog
+from discreta.sim import equal, mutants
 from discreta.sim import speed as speeds
+from discreta.sim.foreign import available
 from discreta.sim.methods import METHODS
 from discreta.sim.smt import Verdict
 from discreta.sim.synth import RUNS, CriticalPath, Measurement
@@ -628,6 +630,51 @@ def test_verilog_with_its_bench_and_core_file(discreta, folder):
     assert "line_tb.v" in (folder / "line.core").read_text()
     assert discreta("verilog", "linear", "--output", "a.v", "--core") == (0, "", "")
     assert "tb" not in (folder / "a.core").read_text()
+
+
+def test_the_verilog_is_proven(discreta):
+    code, out, err = discreta(
+        "prove", "linear", "--width", "4", "--setting", "default", "--verilog"
+    )
+    assert (code, err) == (0, "")
+    assert out.count("  proven ") == 3
+    assert out.count("Verilog = RTL") == 3
+
+
+def test_a_netlist_is_simulated_and_proven(discreta):
+    need_icarus()
+    code, out, err = discreta("netlist", "linear", "--width", "4")
+    assert (code, err) == (0, "")
+    assert re.search(
+        r"^linear +\d+ +\d+ +\d+ +\d+ clocks, \d+ blocks, \d+ steps +\d+\.\d s$", out, re.MULTILINE
+    )
+
+
+def test_a_netlist_that_differs(discreta, monkeypatch):
+    need_icarus()
+    monkeypatch.setattr(equal, "simulate_netlist", lambda *_: (False, "FAIL: clock 3\nFAIL"))
+    code, out, err = discreta("netlist", "linear", "--width", "4", "--no-prove")
+    assert code == 1
+    assert "DIFFERS" in out
+    assert err == "linear: FAIL: clock 3\nFAIL\n"
+
+
+def test_mutants(discreta, monkeypatch):
+    need_icarus()
+    code, out, err = discreta("mutants", "linear", "--width", "4", "--count", "12")
+    assert (code, err) == (0, "")
+    assert re.search(r"^linear +12( +\d+){4} +\d+ s$", out, re.MULTILINE)
+    # One that no one has decided.
+    some = mutants.Mutant(7, "A[0] of a $add: inverted", "hdl/a.py:5")
+    monkeypatch.setattr(mutants, "judge", lambda *_, **__: [mutants.Verdict(some, "", False)])
+    code, out, err = discreta("mutants", "linear", "--width", "4")
+    assert code == 1
+    assert out.endswith("linear 7: A[0] of a $add: inverted (hdl/a.py:5): NOT DECIDED\n")
+
+
+def need_icarus():
+    if reason := available("icarus"):
+        pytest.skip(reason)
 
 
 def test_on_a_carrier(discreta, folder):
