@@ -1,5 +1,6 @@
 """A queue of more than one block; that it is the RTL's, the test bench of the device shows."""
 
+import numpy as np
 import pytest
 
 from discreta.sim.golden.device import make_device
@@ -18,13 +19,8 @@ def run(golden, rows, clocks, **others):
         (0, "override", 128),
         *((0, name, 1) for name in golden.inputs() if "pulse_" in name),
     ]
-
-    class Rows:
-        def tolist(self):
-            return blocks
-
     outputs, accepted = [], []
-    played = play(golden, fields, Rows(), orders=orders)
+    played = play(golden, fields, np.array(blocks), orders=orders)
     for clock, (_, out, inputs) in zip(range(clocks), played, strict=False):
         outputs.append(out)
         if inputs["blocks_valid"] and out["blocks_ready"]:
