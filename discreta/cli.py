@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -49,6 +50,7 @@ from discreta.hdl.device import Device, exact_device
 from discreta.hdl.harness import LoneAccumulator
 from discreta.hdl.parts import PRELOADS
 from discreta.hdl.parts.coefficient_unit import COEFFICIENTS
+from discreta.hdl.plain import PlainPorts
 from discreta.hdl.queue import KINDS as CURVE_KINDS
 from discreta.hdl.verilog import verilog as emit_verilog
 from discreta.sim.bitstream import RUNS as BUILD_RUNS
@@ -57,7 +59,9 @@ from discreta.sim.bitstream import Bitstream, build
 from discreta.sim.carrier import DEFAULT_PERIOD, DEFAULT_SPEED, MAX_PERIOD
 from discreta.sim.compiled import compiler
 from discreta.sim.conics import ConicBlock, ellipse, from_coefficients, parabola
+from discreta.sim.corefile import core_file
 from discreta.sim.curves import Arc, Conic, Curve, Polyline
+from discreta.sim.foreign import available
 from discreta.sim.fpga import FPGAS, SynthesisError, check_tools
 from discreta.sim.gcode import IGNORABLE, SUFFIXES, Move, is_gcode, read_moves
 from discreta.sim.machine import Drive, device_blocks
@@ -78,6 +82,8 @@ from discreta.sim.program import CORES, Program, program_blocks, run_program, sp
 from discreta.sim.run import run, say_choices
 from discreta.sim.simulate import ENGINES, DeadCoreError, default_engine
 from discreta.sim.synth import RUNS, Measurement, measure
+from discreta.sim.testbench import testbench as write_bench
+from discreta.sim.vectors import golden_vectors
 
 if TYPE_CHECKING:
     from discreta.sim.groups import Group
@@ -990,18 +996,56 @@ def _out(*, err: bool = False) -> Console:
 @_axes
 @_setting_options
 @click.option("--output", metavar="FILE.v", default="-", help="[default: standard output]")
-def verilog(method: Design, width: int, axes: int, setting: str, output: str, **given: Any) -> None:
+@click.option(
+    "--testbench",
+    is_flag=True,
+    help="Write a self-checking test bench with golden vectors beside it, FILE_tb.v.",
+)
+@click.option(
+    "--vectors", is_flag=True, help="Write these vectors beside it for cocotb, FILE.json."
+)
+@click.option(
+    "--core", is_flag=True, help="Write a FuseSoC core file beside it, FILE.core, for both."
+)
+def verilog(
+    method: Design,
+    width: int,
+    axes: int,
+    setting: str,
+    output: str,
+    testbench: bool,
+    vectors: bool,
+    core: bool,
+    **given: Any,
+) -> None:
     """Write a method as Verilog-2005 with plain ports, or the whole device, or a unit of it.
 
     These are device (lines, arcs and conics from one queue to the pins of the motor drivers), feed
-    and pulse.
+    and pulse. The test bench runs in any simulator that knows $fatal, and prints PASS or FAIL.
 
-    Example: discreta verilog exact_line --width 16 --output line.v
+    Example: discreta verilog exact_line --width 16 --output line.v --testbench
     """
     make = _maker(method, width, axes, setting, given)
+    name = f"discreta_{method.name}"
+    beside = (("testbench", testbench), ("vectors", vectors), ("core", core))
+    for option, on in beside:
+        if on and output == "-":
+            raise BadInputError(f"--{option} is written beside the core: give --output FILE.v")
+    file = Path(output)
+    bench_file = file.with_name(f"{file.stem}_tb.v")
     with Outputs() as outputs:
-        file = outputs.open(output)
-        file.write(emit_verilog(make(), f"discreta_{method.name}"))
+        outputs.open(output).write(emit_verilog(top := PlainPorts(make()), name))
+        if testbench or vectors:
+            golden = method.model(width, axes, **_chosen(method, setting, given))
+            found = golden_vectors(method, top, golden)
+            if testbench:
+                outputs.open(str(bench_file)).write(write_bench(top, name, found))
+            if vectors:
+                json.dump(asdict(found), outputs.open(str(file.with_suffix(".json"))))
+        if core:
+            bench = bench_file.name if testbench else None
+            text = core_file(method.name, method.summary, name, file.name, bench)
+            outputs.open(str(file.with_suffix(".core"))).write(text)
 
 
 @cli.command("synth", short_help="Measure cells and clock speed on an FPGA.")
@@ -1161,7 +1205,10 @@ def compare_command(methods: tuple[Method, ...], width: int, device: str) -> Non
 @_methods_argument(units=True)
 @_width
 @_one_setting
-def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
+@click.option(
+    "--verilog", is_flag=True, help="Prove instead that the Verilog, read again, is the RTL."
+)
+def prove(methods: tuple[Design, ...], width: int, setting: str | None, verilog: bool) -> None:
     """Prove a method: RTL = golden model, and its promises, for every block of a width.
 
     Or a unit of the device: feed, pulse, or the device itself, with a queue of one block.
@@ -1173,7 +1220,7 @@ def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
     Example: discreta prove exact --width 8
     """
     try:
-        from discreta.sim.prover import prove_variant, shares
+        from discreta.sim.prover import prove_variant, prove_verilog, shares
     except ModuleNotFoundError as error:
         raise BadInputError(
             f"proofs need {error.name}: install the extra, pip install 'discreta[prove]'"
@@ -1184,14 +1231,17 @@ def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
     jobs = [
         (method, variant)
         for method in methods
-        for variant in [*([None] if shares(method.name) else []), *_variants(method, setting)]
+        for variant in [
+            *([None] if shares(method.name) and not verilog else []),
+            *_variants(method, setting),
+        ]
     ]
     good = True
     began = time.perf_counter()
     count = {"proven": 0, "checked": 0}
     with ProcessPoolExecutor(min(len(jobs), os.cpu_count() or 1)) as pool:
         results = pool.map(
-            prove_variant,
+            prove_verilog if verilog else prove_variant,
             [method.name for method, _ in jobs],
             [width] * len(jobs),
             [variant for _, variant in jobs],
@@ -1217,6 +1267,143 @@ def prove(methods: tuple[Design, ...], width: int, setting: str | None) -> None:
     counted = f"{count['proven']} proven, "
     counted += f"{count['checked']} checked in every case, " if count["checked"] else ""
     out.print(f"{counted}{'all hold' if good else 'NOT ALL HOLD'}, {seconds:.1f} s")
+    if not good:
+        raise click.exceptions.Exit(1)
+
+
+@cli.command("netlist", short_help="Simulate and prove the netlist for an iCE40.")
+@click.argument("methods", type=_MethodName(), nargs=-1, required=True, metavar="METHOD...")
+@_width
+@_one_setting
+@click.option(
+    "--prove/--no-prove",
+    default=True,
+    show_default=True,
+    help="Whether to prove the netlist equal to the RTL, for all states and inputs.",
+)
+def netlist_command(
+    methods: tuple[Method, ...], width: int, setting: str | None, prove: bool
+) -> None:
+    """Synthesize methods for the iCE40, and show that the netlist is the method still.
+
+    Golden vectors run through the netlist in Icarus, with Yosys' models of the cells, and every
+    output is compared at every clock; then one clock of netlist and RTL is proven equal, from all
+    states. Without --setting that of the default. Exits 1 when something differs or is not proven.
+
+    Example: discreta netlist linear circular exact_line exact_arc --width 16
+    """
+    try:
+        from discreta.sim.equal import netlist, simulate_netlist
+        from discreta.sim.prover import prove_netlist
+    except ModuleNotFoundError as error:
+        raise BadInputError(
+            f"netlists need {error.name}: install the extra, pip install 'discreta[prove]'"
+        ) from None
+    if reason := available("icarus"):
+        raise BadInputError(reason)
+    for method in methods:
+        _check_width(method, width)
+    table = _table(("method", "LUTs", "carries", "flip-flops", "simulated", "proven"))
+    findings = []
+    with _progress("methods") as show:
+        show(0, len(methods))
+        for done, method in enumerate(methods, start=1):
+            choices = _chosen(method, setting or "default", {})
+            try:
+                cells = netlist(method.core(width, **choices), "core").cells
+                same, said = simulate_netlist(method, width, choices)
+                verdicts = prove_netlist(method.name, width, choices) if prove else []
+            except (SynthesisError, RuntimeError) as error:
+                raise SynthesisError(f"{method.name}: {error}") from None
+            wrong = [it for it in verdicts if not it.holds]
+            findings += [f"{method.name}: {said}"] if not same else []
+            findings += [f"{method.name}: {it.title}: {it.counterexample}" for it in wrong]
+            table.add_row(
+                method.name,
+                *(
+                    str(sum(count for cell, count in cells.items() if cell.startswith(kind)))
+                    for kind in ("SB_LUT4", "SB_CARRY", "SB_DFF")
+                ),
+                said.splitlines()[0].partition(", ")[2] if same else "DIFFERS",
+                ("NOT PROVEN" if wrong else f"{sum(it.seconds for it in verdicts):.1f} s")
+                if prove
+                else "-",
+            )
+            show(done, len(methods))
+    out = _out()
+    out.print(f"Lattice iCE40, width {width}")
+    out.print(table)
+    for finding in findings:
+        click.echo(finding, err=True)
+    if findings:
+        raise click.exceptions.Exit(1)
+
+
+@cli.command("mutants", short_help="Make defects of a method, and tell which check catches each.")
+@click.argument("methods", type=_MethodName(), nargs=-1, required=True, metavar="METHOD...")
+@_width_option(8)
+@click.option(
+    "--count",
+    type=click.IntRange(1, 10_000),
+    default=200,
+    show_default=True,
+    help="How many mutants of each method.",
+)
+@click.option("--seed", type=click.IntRange(0), default=1970, show_default=True)
+def mutants_command(methods: tuple[Method, ...], width: int, count: int, seed: int) -> None:
+    """Make mutants of methods in their default settings, one defect each, and try every one.
+
+    Yosys changes one bit in the core. Golden vectors run through the mutant in Icarus, the outputs
+    and then every register compared at every clock; and it is compared with the core for all states
+    by SMT. The columns count the mutants by the first check that catches them. What none catches is
+    proven to be the same machine in every state: it is listed with its place. Exits 1 when a mutant
+    is neither.
+
+    Example: discreta mutants linear --count 200
+    """
+    try:
+        from discreta.sim.mutants import CHECKS, judge
+    except ModuleNotFoundError as error:
+        raise BadInputError(
+            f"mutants need {error.name}: install the extra, pip install 'discreta[prove]'"
+        ) from None
+    if reason := available("icarus"):
+        raise BadInputError(reason)
+    for method in methods:
+        _check_width(method, width)
+    table = _table(("method", "mutants", *CHECKS, "none", "time"))
+    left, good = [], True
+    for method in methods:
+        began = time.perf_counter()
+        first = Counter()
+        with _progress(f"mutants of {method.name}") as show:
+            try:
+                for verdict in judge(
+                    method.name,
+                    width,
+                    method.settings["default"],
+                    count=count,
+                    seed=seed,
+                    workers=os.cpu_count() or 1,
+                    progress=show,
+                ):
+                    first[verdict.caught] += 1
+                    good &= bool(verdict.caught) or verdict.same
+                    if not verdict.caught:
+                        left.append((method.name, verdict))
+            except RuntimeError as error:
+                raise SynthesisError(f"{method.name}: {error}") from None
+        caught = [str(first[check]) for check in CHECKS]
+        seconds = f"{time.perf_counter() - began:.0f} s"
+        table.add_row(method.name, str(first.total()), *caught, str(first[""]), seconds)
+    out = _out()
+    out.print(f"width {width}, seed {seed}; by the first check that catches them")
+    out.print(table)
+    for name, verdict in left:
+        mutant = verdict.mutant
+        how = "the same machine" if verdict.same else "NOT DECIDED"
+        where = mutant.where or "no line"
+        click.echo(f"{name} {mutant.number}: {mutant.what} ({where}): {how}")
     if not good:
         raise click.exceptions.Exit(1)
 

@@ -20,7 +20,17 @@ from discreta.hdl.plain import PlainPorts
 from discreta.sim.compiled import compiler
 from discreta.sim.stalls import NO_STALLS, Stalls
 
-__all__ = ["LINT_WAIVERS", "SIMULATORS", "UnknownOutputError", "available", "lint", "run_foreign"]
+__all__ = [
+    "LINT_WAIVERS",
+    "SIMULATORS",
+    "UnknownOutputError",
+    "available",
+    "build_icarus",
+    "lint",
+    "run_foreign",
+    "run_program",
+    "run_testbench",
+]
 
 #: The simulators :func:`run_foreign` knows.
 SIMULATORS = ("icarus", "verilator")
@@ -102,6 +112,15 @@ int main(int argc, char **argv) {{
         bench.eval();
     }}
 }}
+"""
+
+
+# The same for a bench that has its own clock and so its own main.
+_VERILATOR_BENCH = """\
+#include <verilated.cpp>
+#include <verilated_threads.cpp>
+#include <verilated_timing.cpp>
+{sources}
 """
 
 
@@ -214,6 +233,70 @@ def run_foreign(
     return trace
 
 
+def run_testbench(text: str, bench: str, name: str, simulator: str) -> tuple[int, str]:
+    """Run a test bench of its own clock, and give its exit code and what it prints.
+
+    Parameters
+    ----------
+    text, bench : str
+        The Verilog of the core, and of the bench.
+    name : str
+        The bench's module.
+    simulator : str
+        One of :data:`SIMULATORS`.
+
+    Raises
+    ------
+    RuntimeError
+        The simulator is missing, did not accept the texts or did not end in time.
+    ValueError
+        There is no such simulator.
+    """
+    if reason := available(simulator):
+        raise RuntimeError(reason)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        if simulator == "icarus":
+            build_icarus(folder, text, bench, name, "bench")
+            command = ["vvp", "-n", "bench"]
+        else:
+            (folder / "design.v").write_text(text)
+            (folder / "bench.v").write_text(bench)
+            options = ["--cc", "--main", "--timing", "-Wno-fatal", "--top-module", name]
+            options += ["--prefix", "Vbench", "bench.v", "design.v"]
+            flags = ["-std=c++20", "-fcoroutines"]
+            command = _compile_verilated(folder, options, _VERILATOR_BENCH, flags)
+        return run_program(command, folder)
+
+
+def build_icarus(folder: Path, text: str, bench: str, name: str, program: str) -> None:
+    """Compile a core and a bench in Icarus, to a program in a folder.
+
+    Raises
+    ------
+    RuntimeError
+        Icarus is missing, or did not accept the texts.
+    """
+    if reason := available("icarus"):
+        raise RuntimeError(reason)
+    (folder / "design.v").write_text(text)
+    (folder / "bench.v").write_text(bench)
+    options = ["-g2005", "-s", name, "-o", program]
+    _run(["iverilog", *options, "bench.v", "design.v"], folder)
+
+
+def run_program(command: list[str], folder: Path) -> tuple[int, str]:
+    """Run a program in a folder, and give its exit code and what it prints.
+
+    Raises
+    ------
+    RuntimeError
+        It did not end in time.
+    """
+    done = _call(command, folder)
+    return done.returncode, done.stdout + done.stderr
+
+
 def lint(text: str, module: str) -> list[str]:
     """Give what Verilator's lint has against a text, without :data:`LINT_WAIVERS`.
 
@@ -286,20 +369,26 @@ def _build_icarus(folder: Path) -> list[str]:
 
 def _build_verilator(folder: Path) -> list[str]:
     """Build ``design.v`` and ``bench.v`` in a folder, and give the command that runs them."""
+    random = ["--x-assign", "unique", "--x-initial", "unique"]
+    options = ["--cc", "--no-timing", "-Wno-fatal", "--top-module", "bench"]
+    options += [*random, "bench.v", "design.v"]
+    command = _compile_verilated(folder, options, _VERILATOR_MAIN, ["-std=c++17"])
+    return [*command, "+verilator+rand+reset+2", "+verilator+seed+1"]
+
+
+def _compile_verilated(folder: Path, options: list[str], main: str, flags: list[str]) -> list[str]:
+    """Build what Verilator makes with some options, and give the command that runs it."""
     root, cxx = _verilator_root(), compiler()
     assert root is not None
     assert cxx is not None
-    random = ["--x-assign", "unique", "--x-initial", "unique"]
-    options = ["--cc", "--no-timing", "-Wno-fatal", "--top-module", "bench", "--Mdir", "made"]
-    command = [str(root / _VERILATOR), *options, *random, "bench.v", "design.v"]
-    _run(command, folder, VERILATOR_ROOT=str(root))
+    _run([str(root / _VERILATOR), "--Mdir", "made", *options], folder, VERILATOR_ROOT=str(root))
     sources = sorted(path.name for path in (folder / "made").glob("*.cpp"))
     includes = "\n".join(f'#include "{name}"' for name in sources)
-    (folder / "main.cc").write_text(_VERILATOR_MAIN.format(sources=includes))
+    (folder / "main.cc").write_text(main.format(sources=includes))
     paths = [f"-I{path}" for path in (root / "include", root / "include" / "vltstd", "made")]
-    flags = ["-std=c++17", "-O0", "-w", "-DVERILATOR=1", "-pthread"]
+    flags = [*flags, "-O0", "-w", "-DVERILATOR=1", "-pthread"]
     _run([cxx, *flags, *paths, "-o", "bench", "main.cc"], folder)
-    return [str(folder / "bench"), "+verilator+rand+reset+2", "+verilator+seed+1"]
+    return [str(folder / "bench")]
 
 
 def _verilator_root() -> Path | None:

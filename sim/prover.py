@@ -2,11 +2,12 @@
 
 from typing import Any
 
+from discreta.sim.equal import netlist_equivalence, verilog_equivalence
 from discreta.sim.methods import METHODS
 from discreta.sim.smt import Verdict, check, equivalence
 from discreta.sim.units import UNITS
 
-__all__ = ["prove_variant", "shares"]
+__all__ = ["prove_netlist", "prove_variant", "prove_verilog", "shares"]
 
 _DESIGNS = METHODS | UNITS
 
@@ -14,6 +15,16 @@ _DESIGNS = METHODS | UNITS
 def shares(name: str) -> bool:
     """Tell whether something is promised of all variants of a method alike."""
     return hasattr(_DESIGNS[name].proof_module(), "shared")
+
+
+def prove_verilog(name: str, width: int, variant: dict[str, Any]) -> list[Verdict]:
+    """Prove that the Verilog of one variant, read again, is its RTL."""
+    return [check(it) for it in verilog_equivalence(_DESIGNS[name].core(width, **variant))]
+
+
+def prove_netlist(name: str, width: int, variant: dict[str, Any]) -> list[Verdict]:
+    """Prove that the iCE40 netlist of one variant is its RTL."""
+    return [check(it) for it in netlist_equivalence(_DESIGNS[name].core(width, **variant))]
 
 
 def prove_variant(name: str, width: int, variant: dict[str, Any] | None) -> list[Verdict]:

@@ -14,6 +14,7 @@ from discreta.sim.golden.constant_speed import constant_arc as golden_constant_a
 from discreta.sim.golden.constant_speed import constant_line as golden_constant_line
 from discreta.sim.golden.device import make_device as golden_device
 from discreta.sim.golden.feed import FeedUnit as GoldenFeedUnit
+from discreta.sim.golden.fifo import QueuedDevice
 from discreta.sim.golden.link import Link as GoldenLink
 from discreta.sim.golden.pulse import PulseUnit as GoldenPulseUnit
 from discreta.sim.golden.uart import UartReceiver as GoldenUartReceiver
@@ -27,9 +28,9 @@ EXERCISE_PAUSES = (256, 358)
 
 
 def _golden_device(width: int, *, kinds: tuple[str, ...], depth: int) -> Any:
-    """Make the golden model; that of a longer queue is not written."""
-    assert depth == 1
-    return golden_device(width, kinds)
+    """Make the golden model; that of a longer queue runs on integers alone."""
+    device = golden_device(width, kinds)
+    return device if depth == 1 else QueuedDevice(device, depth)
 
 
 def _link(width: int, axes: int = 2, *, kinds: tuple[str, ...], depth: int) -> Link:

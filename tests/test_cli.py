@@ -38,9 +38,11 @@ from discreta.hdl.linear import Linear
 from discreta.hdl.pulse import PulseUnit
 from discreta.hdl.quadrant import line_block_layout
 from discreta.hdl.verilog import verilog
+from discreta.sim import equal, mutants
 from discreta.sim import speed as speeds
 from discreta.sim.bitstream import SEEDS as BUILD_SEEDS
 from discreta.sim.bitstream import Bitstream
+from discreta.sim.foreign import available
 from discreta.sim.fpga import SynthesisError
 from discreta.sim.groups import Group, survey_groups
 from discreta.sim.methods import METHODS
@@ -687,6 +689,63 @@ def test_verilog_of_a_setting(discreta, words, core):
     assert (code, err) == (0, "")
     assert out == verilog(core(), f"discreta_{words[0]}")
     assert re.findall(r"^module (\w+)", out, re.MULTILINE)[0] == f"discreta_{words[0]}"
+
+
+def test_verilog_with_its_bench_and_core_file(discreta, folder):
+    options = ["--width", "5", "--preload", "zero", "--output", "line.v"]
+    options += ["--testbench", "--vectors", "--core"]
+    assert discreta("verilog", "linear", *options) == (0, "", "")
+    assert sorted(snapshot(folder)) == ["line.core", "line.json", "line.v", "line_tb.v"]
+    assert (folder / "line.v").read_text() == verilog(Linear(5, preload="zero"), "discreta_linear")
+    assert "module discreta_linear_tb;" in (folder / "line_tb.v").read_text()
+    assert "line_tb.v" in (folder / "line.core").read_text()
+    assert discreta("verilog", "linear", "--output", "a.v", "--core") == (0, "", "")
+    assert "tb" not in (folder / "a.core").read_text()
+
+
+def test_the_verilog_is_proven(discreta):
+    code, out, err = discreta(
+        "prove", "linear", "--width", "4", "--setting", "default", "--verilog"
+    )
+    assert (code, err) == (0, "")
+    assert out.count("  proven ") == 3
+    assert out.count("Verilog = RTL") == 3
+
+
+def test_a_netlist_is_simulated_and_proven(discreta):
+    need_icarus()
+    code, out, err = discreta("netlist", "linear", "--width", "4")
+    assert (code, err) == (0, "")
+    assert re.search(
+        r"^linear +\d+ +\d+ +\d+ +\d+ clocks, \d+ blocks, \d+ steps +\d+\.\d s$", out, re.MULTILINE
+    )
+
+
+def test_a_netlist_that_differs(discreta, monkeypatch):
+    need_icarus()
+    monkeypatch.setattr(equal, "simulate_netlist", lambda *_: (False, "FAIL: clock 3\nFAIL"))
+    code, out, err = discreta("netlist", "linear", "--width", "4", "--no-prove")
+    assert code == 1
+    assert "DIFFERS" in out
+    assert err == "linear: FAIL: clock 3\nFAIL\n"
+
+
+def test_mutants(discreta, monkeypatch):
+    need_icarus()
+    code, out, err = discreta("mutants", "linear", "--width", "4", "--count", "12")
+    assert (code, err) == (0, "")
+    assert re.search(r"^linear +12( +\d+){4} +\d+ s$", out, re.MULTILINE)
+    # One that no one has decided.
+    some = mutants.Mutant(7, "A[0] of a $add: inverted", "hdl/a.py:5")
+    monkeypatch.setattr(mutants, "judge", lambda *_, **__: [mutants.Verdict(some, "", False)])
+    code, out, err = discreta("mutants", "linear", "--width", "4")
+    assert code == 1
+    assert out.endswith("linear 7: A[0] of a $add: inverted (hdl/a.py:5): NOT DECIDED\n")
+
+
+def need_icarus():
+    if reason := available("icarus"):
+        pytest.skip(reason)
 
 
 def test_on_a_carrier(discreta, folder):
@@ -1435,6 +1494,14 @@ BAD = {
     "verilog": (
         ["verilog", "linear", "--output", "no/a.v"],
         "cannot write no/a.v: there is no folder no; make it first",
+    ),
+    "test bench of the standard output": (
+        ["verilog", "linear", "--testbench"],
+        "--testbench is written beside the core: give --output FILE.v",
+    ),
+    "core file of the standard output": (
+        ["verilog", "linear", "--core"],
+        "--core is written beside the core: give --output FILE.v",
     ),
     "picture": (
         [*LINE, "--plot", "p.pdf"],

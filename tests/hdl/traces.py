@@ -1,11 +1,13 @@
 """The golden model under the handshakes of the engines, clock by clock."""
 
 from collections.abc import Collection
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from discreta.sim.stalls import NO_STALLS, Stalls
+from discreta.sim.vectors import play
 
 
 def golden_trace(
@@ -40,23 +42,14 @@ def golden_trace(
     registers, outputs : arrays of int, shape (clocks, registers), (clocks, outputs)
         In the model's own order; of Python's integers when a register has more than 63 bits.
     """
-    rows = blocks.tolist()
-    state = golden.reset()
-    fed, held = 0, False
-    registers, outputs = [], []
-    for clock in range(clocks):
-        out = golden.outputs(state)
+    registers, outputs, taken = [], [], 0
+    for state, out, inputs in islice(play(golden, fields, blocks, stalls, resets), clocks):
         registers.append([state[name] for name in golden.registers()])
         outputs.append(list(out.values()))
-        idle = fed == len(rows) and not (out["busy"] or out["done"] or out["error"])
+        idle = taken == len(blocks) and not (out["busy"] or out["done"] or out["error"])
         if until_idle and idle:
             break
-        offered = held or (fed < len(rows) and stalls.offers(clock))
-        inputs = dict(zip(fields, rows[fed] if offered else [0] * len(fields), strict=True))
-        inputs |= {"blocks_valid": int(offered), "steps_ready": int(stalls.ready(clock))}
-        accepted = offered and bool(out["blocks_ready"]) and clock not in resets
-        state = golden.reset() if clock in resets else golden.step(state, inputs)
-        fed, held = fed + accepted, offered and not accepted
+        taken += bool(inputs["blocks_valid"] and out["blocks_ready"] and not inputs["rst"])
     else:
         assert not until_idle, f"the golden model is not done after {clocks} clocks"
     wide = any(bits > 63 for bits, _ in golden.registers().values())
