@@ -19,10 +19,12 @@ from typing import Any
 import numpy as np
 
 from discreta.hdl.plain import PlainPorts
-from discreta.sim.arcs import refusals
+from discreta.sim.arcs import is_empty, refusals
 from discreta.sim.carrier import add_timing, least_periods
 from discreta.sim.conics import KINDS as CONIC_KINDS
 from discreta.sim.conics import random_blocks
+from discreta.sim.constant_speed import paced
+from discreta.sim.golden.constant_speed import ConstantSpeed
 from discreta.sim.methods import Design, Method
 from discreta.sim.stalls import NO_STALLS, Stalls
 
@@ -175,6 +177,8 @@ def golden_vectors(
     if isinstance(design, Method):
         clocks *= _TIMED_ARC_CLOCKS if design.timed and design.curve == "arc" else 1
         blocks = draw_blocks(design, golden, len(top.block_fields), random)
+    elif isinstance(golden, ConstantSpeed):
+        blocks = _paced(golden, random)
     elif top.block_fields:
         blocks = _device_blocks(top, golden, random)
         orders = _device_orders(top, random, clocks)
@@ -320,6 +324,22 @@ def _timed(
     timed[:, -1] += random.integers(0, 8, len(blocks))
     timed[1, -2], timed[-3, -1] = 0, 1
     return timed
+
+
+def _paced(golden: ConstantSpeed, random: np.random.Generator) -> np.ndarray:
+    """Draw lines or arcs at constant speed, every fourth at full speed."""
+    width, axes = golden.width, golden.axes
+    if golden.round:
+        kind, flat = "arc", _arcs(width, random)
+        further = random.integers(-3, 3, (2, len(flat), axes - 2), endpoint=True)
+        # What has no arc takes no axis along.
+        further[1][is_empty(flat)] = further[0][is_empty(flat)]
+        blocks = np.hstack([flat[:, :2], further[0], flat[:, 2:4], further[1], flat[:, 4:]])
+    else:
+        kind, blocks = "line", _lines(width, axes, random)
+    told = paced(kind, blocks, width, axes)
+    told[::4, blocks.shape[1]] = 0
+    return told
 
 
 # The device
