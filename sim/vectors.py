@@ -333,7 +333,8 @@ def _paced(golden: ConstantSpeed, random: np.random.Generator) -> np.ndarray:
         kind, flat = "arc", _arcs(width, random)
         further = random.integers(-3, 3, (2, len(flat), axes - 2), endpoint=True)
         # What has no arc takes no axis along.
-        further[1][is_empty(flat)] = further[0][is_empty(flat)]
+        none = is_empty(flat) | (refusals(flat, width) != 0)
+        further[1][none] = further[0][none]
         blocks = np.hstack([flat[:, :2], further[0], flat[:, 2:4], further[1], flat[:, 4:]])
     else:
         kind, blocks = "line", _lines(width, axes, random)
