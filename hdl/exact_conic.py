@@ -475,8 +475,8 @@ class ExactConic(Part):
                         digits[0].eq(Mux(self.next_x[n], x_scale, 0)),
                         digits[1].eq(Mux(self.next_y[n], y_scale, 0)),
                     ]
-                    turned = [digit ^ off.replicate(len(g)) for digit in digits]
-                    m.d.sync += g.eq(_three(Cat(off, g)[: len(g)], *turned, off))
+                    x_part, y_part = (digit ^ off.replicate(len(g)) for digit in digits)
+                    m.d.sync += g.eq(_three(Cat(off, g)[: len(g)], x_part, y_part, off))
             with m.If(tick == n + 2):
                 m.d.sync += [
                     self.next_p3.eq(self.next_p3 - self.next_x),
