@@ -322,8 +322,8 @@ class Host:
                         return status
         if answered or self._reader.foreign:
             raise LinkError(
-                "the board is built for other blocks: give the width and the kinds of curves that "
-                "it was built with"
+                "the board is built for other blocks: give the width, the axes and the kinds of "
+                "curves that it was built with"
             )
         raise LinkError(
             "no answer from the board: check the port, the baud rate, and that the board runs"

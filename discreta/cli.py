@@ -1685,8 +1685,6 @@ def _job(file: str, width: int, kinds: tuple[str, ...], given: dict[str, Any]) -
     drive = cast(Drive, _drive(given | {"feed": max(feeds)}, pictures))
     whole = Program(moves)
     used = sorted({move.kind for move in moves})
-    if "arc" in used and whole.axes > 2:
-        raise BadInputError(f"{file} has arcs and moves Z: leave Z out, or make the arcs of lines")
     device = _exact_device(width, whole.axes, kinds, used)
     return Job(device, program_blocks(device, whole, drive, feeds), drive)
 

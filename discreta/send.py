@@ -142,8 +142,8 @@ def _send(
     status = host.open()
     if status.reason is StopReason.STOP or (clear and status.reason is not StopReason.NONE):
         status = host.clear()
-    if (reason := status.reason.name) != StopReason.NONE.name:
-        raise LinkError(f"the machine stands still: {reason}; see to it, and give --clear")
+    if status.reason is not StopReason.NONE:
+        raise LinkError(f"the machine stands still: {_why(status)}; see to it, and give --clear")
     if status.held:
         host.command("RESUME")
     host.set(job.drive.controls)
@@ -161,9 +161,14 @@ def _send(
         "blocks done": status.done,
         **{name.replace("_", " "): value for name, value in vars(host.statistics).items()},
         "position": list(status.position),
-        **({} if status.reason is StopReason.NONE else {"stopped": str(status.reason.name)}),
+        **({} if status.reason is StopReason.NONE else {"stopped": _why(status)}),
         "seconds": round(seconds, 3),
     }
+
+
+def _why(status: Status) -> str:
+    """Name the reason for which the machine stands still."""
+    return StopReason(status.reason).name
 
 
 class Simulation:
