@@ -164,7 +164,7 @@ def _said(number: int, command: str, kinds: Mapping[str, str]) -> Mutant:
     options = dict(re.findall(r"-(mode|cell|port|portbit|ctrlbit|wire|wirebit) (\S+)", command))
     sources = re.findall(r"-src (\S+)", command)
     where = sorted({line for source in sources for line in source.split("|")})
-    shown = [re.sub(r"^.*/((?:hdl|sim|boards)/)", r"\1", line) for line in where]
+    shown = [re.sub(r"^.*/(?:site-packages/|(?=(?:hdl|sim|boards)/))", "", line) for line in where]
     shown = [re.sub(r":(\d+)(?:\.\d+-\d+\.\d+)?$", r":\1", line) for line in shown]
     doing = {
         "inv": "inverted",

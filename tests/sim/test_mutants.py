@@ -1,3 +1,4 @@
+import re
 from collections import Counter
 
 import pytest
@@ -32,7 +33,7 @@ def test_every_mutant_is_caught_or_proven_to_be_none(name):
     assert set(first) <= {*CHECKS, ""}
     for verdict in verdicts:
         assert verdict.same == (not verdict.caught)
-        assert verdict.mutant.where.startswith("hdl/") or not verdict.mutant.where
+        assert re.match(r"((hdl|amaranth)/\S+:\d+|$)", verdict.mutant.where)
 
 
 def test_the_proof_catches_what_the_bench_does(monkeypatch):
