@@ -1020,8 +1020,9 @@ def verilog(
 ) -> None:
     """Write a method as Verilog-2005 with plain ports, or the whole device, or a unit of it.
 
-    These are device (lines, arcs and conics from one queue to the pins of the motor drivers), feed
-    and pulse. The test bench runs in any simulator that knows $fatal, and prints PASS or FAIL.
+    These are device (lines, arcs and conics from one queue to the pins of the motor drivers), feed,
+    pulse, and link, uart_receiver and uart_transmitter, which take it to a serial line.
+    The test bench runs in any simulator that knows $fatal, and prints PASS or FAIL.
 
     Example: discreta verilog exact_line --width 16 --output line.v --testbench
     """

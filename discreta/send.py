@@ -114,9 +114,15 @@ def _format(device: Device) -> tuple[Any, int, int]:
 
 @contextmanager
 def _interrupts() -> Iterator[threading.Event]:
-    """Note an interrupt by the user in place of breaking off at any point."""
+    """Note the user's first interrupt in place of breaking off at any point."""
     event = threading.Event()
-    before = signal.signal(signal.SIGINT, lambda *_: event.set())
+    before = signal.getsignal(signal.SIGINT)
+
+    def note(*_: object) -> None:
+        event.set()
+        signal.signal(signal.SIGINT, before)  # whoever cannot wait interrupts once more
+
+    signal.signal(signal.SIGINT, note)
     try:
         yield event
     finally:
