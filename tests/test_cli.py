@@ -849,9 +849,9 @@ def test_survey_of_all_the_exact_ones(discreta, monkeypatch):
         ]
 
     monkeypatch.setattr("discreta.sim.groups.survey_groups", few)
-    code, out, err = discreta("survey", "exact", "comparison", "--width", "4")
+    code, out, err = discreta("survey", "exact", "comparison", "--width", "6")
     assert (code, err) == (0, "")
-    titles = [line.split(",")[0] for line in out.splitlines() if "width 4" in line]
+    titles = [line.split(",")[0] for line in out.splitlines() if "width 6" in line]
     assert titles == ["exact_line", "exact_arc", "exact_conic", "comparison"]
 
 
@@ -1653,8 +1653,10 @@ def test_what_differs_at_the_pins_fails(discreta, monkeypatch):
 @pytest.fixture
 def measured(monkeypatch):
     """Have the measurements take a sample of each."""
-    for name in ("along_path", "accuracy", "limits"):
+    for name in ("along_path", "accuracy", "limits", "drift", "helices"):
         sample = {
+            "drift": {"degrees": [0, 30], "radii": [20], "length": 60},
+            "helices": {"count": 4},
             "along_path": {"degrees": [0, 30, 45], "radii": [100]},
             "accuracy": {"octaves": [0, 1, 5]},
             "limits": {"methods": ["linear", "comparison", "carrier_linear"]},
@@ -1667,16 +1669,20 @@ def test_feed_prints_the_speed_along_the_path_and_the_accuracy(discreta):
     code, out, err = discreta("feed")
     assert (code, err) == (0, "")
     lines = out.splitlines()
-    assert [line for line in lines if line.startswith("speed")] == [
-        f"speed along the path, {rule.title}" for rule in speeds.RULES
-    ]
+    assert lines[0] == "constant speed"
+    assert lines[2].startswith("lines of 60 steps")
+    assert all(float(number) < 2 for line in lines[2:4] for number in line.split()[-3:])
+    helices = lines.index("arcs with a further axis")
+    assert [line.split()[1:3] for line in lines[helices + 2 : helices + 5]] == [["4", "0"]] * 3
+    titles = [f"speed along the path, {rule.title}" for rule in speeds.RULES]
+    assert [line for line in lines if line.startswith("speed")] == titles
     pairing, exercise = (
         lines[
             begin + 2 : begin
             + 2
             + next(k for k, line in enumerate(lines[begin + 2 :]) if "%" in line or "speed" in line)
         ]
-        for begin in (0, lines.index("speed along the path, 1.4 after a step on both axes"))
+        for begin in map(lines.index, titles[:2])
     )
     slowest = [
         min(float(number) for row in rows for number in re.findall(r"[+-]\d+\.\d\d", row))

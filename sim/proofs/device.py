@@ -24,7 +24,7 @@ __all__ = ["promises"]
 _PREPARING = (
     *("done", "error", "pending", "fault", "start_", "delta_", "open", "weighed", "beyond_"),
     *("way_", "chosen", "sum_down", "difference_down", "ready_", "prepared", "refused"),
-    *("next_", "timer_next", "timer_ended"),
+    *("bare_", "room", "next_", "timer_next", "timer_ended"),
 )
 
 

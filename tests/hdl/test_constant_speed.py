@@ -137,8 +137,8 @@ class TestCompiled:
         blocks = paced("line", np.array([[0, 0, x, y]]), 8, 2)
         ticks, when, *_ = run(constant_line(8), blocks)
         assert abs(len(ticks) - hypot(x, y)) <= 1.5
-        # A tick a clock, none lost; the first waits in clock 7.
-        assert when.tolist() == list(range(7, 7 + len(ticks)))
+        # A tick a clock, none lost; the first step of a line waits in clock 8.
+        assert when.tolist() == list(range(8, 8 + len(ticks)))
 
     def test_between_lines_is_one_clock(self):
         points = np.array([[0, 0], [100, 0], [100, 80], [20, 0], [19, -90]])

@@ -758,11 +758,11 @@ def test_hold_loses_nothing_and_single_steps_go():
 
 
 def test_a_single_step_passes_ticks_that_move_nothing():
-    """A line of which every other tick carries a step: at F = 1 they leave from clock 8 on.
+    """A line of which every other tick carries a step: at F = 1 they leave from clock 9 on.
 
-    Handed over in 1, so the first one waits in 8. The hold acts two clocks later: ticks leave in 8
-    to 15, the last of them empty. So the first single step is there at once, in the clock after the
-    edge, and is seen two later; the others have an empty tick to pass before.
+    Handed over in 1, so the first one waits in 9. The hold acts two clocks later: ticks leave in 9
+    to 15, the last of them with a step. So every single step has an empty tick to pass before: that
+    leaves in the clock after the edge, the step in the next one, and it is seen two later.
     """
     orders = [*calm(), (14, "hold", 1), (120, "hold", 0)]
     orders += [(at + k, "single", 1 - k) for at in (60, 80, 100) for k in (0, 1)]
@@ -770,7 +770,7 @@ def test_a_single_step_passes_ticks_that_move_nothing():
     seen = run(PysimModel, make(4, ("line",)), blocks, 400, orders, until_idle=True)
     clocks, steps = pulses_of(seen)
     assert steps == [(1, 0)] * 9
-    assert clocks[clocks < 122].tolist() == [10, 12, 14, 16, 63, 84, 104]
+    assert clocks[clocks < 122].tolist() == [11, 13, 15, 17, 64, 84, 104]
 
 
 def test_stop_under_hold_with_a_single_step_that_waits():

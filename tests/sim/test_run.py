@@ -158,7 +158,9 @@ def test_a_method_draws_its_own_curves_alone():
         BadInputError, match=r"^method circular draws arcs and no lines: choose exact_line or lin"
     ):
         run(Polyline(POINTS), CIRCULAR)
-    with pytest.raises(BadInputError, match=r"^method linear draws lines and no arcs: choose circ"):
+    with pytest.raises(
+        BadInputError, match=r"^method linear draws lines and no arcs: choose exact_arc or circ"
+    ):
         run(ARC, LINEAR)
 
 

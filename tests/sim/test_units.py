@@ -8,7 +8,8 @@ from discreta.sim.units import UNITS
 
 
 def test_names_are_those_of_no_method():
-    assert set(UNITS) == {"constant_line", "constant_arc", "feed", "pulse", "device"}
+    of_lines = {"constant_line", "constant_arc", "link", "uart_receiver", "uart_transmitter"}
+    assert set(UNITS) == {*of_lines, "feed", "pulse", "device"}
     assert not set(UNITS) & set(METHODS)
 
 

@@ -45,31 +45,31 @@ LINE = {"kind": 0, "end_x": 8, "end_y": 0}
 
 
 def test_clocks_of_a_line():
-    """Accepted in 0, handed over in 1: the first step of the exact line waits 7 clocks later, in 8.
+    """Accepted in 0, handed over in 1: the first step of the exact line waits 8 clocks later, in 9.
 
     That is behind the speed: the block begins in 2, so F is multiplied in 3, is the target in 5 and
     the rate in 6. From then on a step waits in every clock, and leaves when the one before it is
     launched: a pulse of 1 in and 1 out takes two clocks.
     """
     shown = trace(make_device(4, ("line",)), [LINE], 40)
-    # Taken in 8, pending in 9, seen in 10.
-    assert edges(shown, "x_step") == list(range(10, 26, 2))
-    assert [out["position_x"] for out in shown[9:27:2]] == list(range(9))
-    # The second one is taken in 9 and waits for two clocks, as all behind it: the last one leaves
-    # in 21, done follows by a clock; its pulse is out in 24, and in in 25.
-    assert [clock for clock, out in enumerate(shown) if out["done"]] == [22]
-    assert [out["busy"] for out in shown] == [0] + [1] * 24 + [0] * 15
+    # Taken in 9, pending in 10, seen in 11.
+    assert edges(shown, "x_step") == list(range(11, 27, 2))
+    assert [out["position_x"] for out in shown[10:28:2]] == list(range(9))
+    # The second one is taken in 10 and waits for two clocks, as all behind it: the last one leaves
+    # in 22, done follows by a clock; its pulse is out in 25, and in in 26.
+    assert [clock for clock, out in enumerate(shown) if out["done"]] == [23]
+    assert [out["busy"] for out in shown] == [0] + [1] * 25 + [0] * 14
 
 
 def test_clocks_of_a_line_in_ticks():
     """At a pace of 2 every other tick carries a step, beginning with the first, half a tick due.
 
-    A tick leaves in every clock from 8 on, also those that the pulses have nothing to do with: the
-    last step in 22, the eighth one.
+    A tick leaves in every clock from 9 on, also those that the pulses have nothing to do with: the
+    last step in 23, the eighth one.
     """
     shown = trace(make_device(4, ("line",)), [LINE | {"pace": 2**16}], 40)
-    assert edges(shown, "x_step") == list(range(10, 26, 2))
-    assert [clock for clock, out in enumerate(shown) if out["done"]] == [23]
+    assert edges(shown, "x_step") == list(range(11, 27, 2))
+    assert [clock for clock, out in enumerate(shown) if out["done"]] == [24]
 
 
 def test_done_in_order_without_steps():
@@ -96,7 +96,7 @@ def test_reasons():
 
 
 def test_emergency():
-    """Given in clock 12 alone: the reason in 13, the last edge in 12, no more after 13."""
+    """Given in clock 12 alone: the reason in 13, the last edge in 13, no more after it."""
     shown = trace(
         make_device(4, ("line",)),
         [LINE] * 9,
@@ -104,7 +104,7 @@ def test_emergency():
         [(12, "emergency", 1), (13, "emergency", 0), (30, "clear", 1)],
     )
     assert [out["reason"] for out in shown] == [0] * 13 + [2] * 18 + [0] * 29
-    assert [clock for clock in edges(shown, "x_step") if clock <= 31] == [10, 12]
+    assert [clock for clock in edges(shown, "x_step") if clock <= 31] == [11, 13]
     # Six steps are left of the line that is accepted after it.
     assert len(edges(shown, "x_step")) == 8
 
