@@ -5,6 +5,7 @@ A speed is F = (1 + mantissa/2^16) / 2^exponent steps per clock, an acceleration
 for one on k axes.
 """
 
+from collections.abc import Callable
 from decimal import Context
 from fractions import Fraction
 from math import pi, sqrt
@@ -16,7 +17,7 @@ from discreta.sim.arcs import seen_from_center, swept
 from discreta.sim.conics import curve_points, motion
 from discreta.sim.points import BadInputError
 
-__all__ = ["ahead", "encode_acceleration", "encode_feed", "feed_of", "octagon"]
+__all__ = ["ahead", "encode_acceleration", "encode_feed", "feed_of", "octagon", "of_conic"]
 
 #: Of the slowest speed: there are 1 : 2^24.
 _LAST_EXPONENT = 24
@@ -111,7 +112,7 @@ def octagon(blocks: np.ndarray, kind: str) -> np.ndarray:
         return _of_moves(blocks[:, axes:] - blocks[:, :axes])
     if kind == "arc":
         return _of_arcs(blocks)
-    return np.array([_of_conic(block) for block in blocks], dtype=float)
+    return np.array([of_conic(block, _of_moves) for block in blocks], dtype=float)
 
 
 def _of_moves(moves: np.ndarray) -> np.ndarray:
@@ -138,13 +139,20 @@ def _of_arcs(blocks: np.ndarray) -> np.ndarray:
     return np.hypot(x, y) * (integral(begin + angle) - integral(begin))
 
 
-def _of_conic(block: np.ndarray) -> float:
-    """Give the length of a second-order curve along points of it, whole turns with it."""
+def of_conic(block: np.ndarray, measure: Callable[[np.ndarray], np.ndarray]) -> float:
+    """Give the length of a second-order curve along points of it, whole turns with it.
+
+    Parameters
+    ----------
+    block : array of int64, shape (11,)
+    measure : callable
+        Gives the lengths of straight moves, shape (moves, 2).
+    """
     a, b, c = (int(number) for number in block[:3])
     part = block.copy()
     part[10] = 0  # whole turns left out
     moves = np.diff(curve_points(part), axis=0)
-    length = float(_of_moves(moves).sum())
+    length = float(measure(moves).sum())
     if 4 * a * c <= b * b:
         return length
     turn = part.copy()
@@ -152,7 +160,7 @@ def _of_conic(block: np.ndarray) -> float:
     around = np.diff(curve_points(turn), axis=0)
     longer, whole = (np.abs(row).max(axis=1).sum() for row in (moves, around))
     turns = round((motion(block[None]).steps[0] - longer) / whole)
-    return length + turns * float(_of_moves(around).sum())
+    return length + turns * float(measure(around).sum())
 
 
 def ahead(lengths: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ from discreta.hdl.queue import KINDS, BlockKind, StopReason
 from discreta.sim.carrier import lengths
 from discreta.sim.constant_speed import paced, ticks_of
 from discreta.sim.curves import Curve
-from discreta.sim.feed import ahead, encode_acceleration, encode_feed, feed_of, octagon
+from discreta.sim.feed import ahead, encode_acceleration, encode_feed, feed_of, octagon, of_conic
 from discreta.sim.plotter import Pen, Plotter, PulseTiming, Screen
 from discreta.sim.points import BadInputError
 from discreta.sim.simulate import simulate
@@ -188,6 +188,11 @@ def pace_limit_of(
     return ceil(clocks) + interpolator_clocks
 
 
+def _straight(moves: np.ndarray) -> np.ndarray:
+    """Give the lengths of straight moves."""
+    return np.hypot(*moves.T)
+
+
 @dataclass
 class Trail:
     """A path, of which only a digest is kept: enough to tell whether another one is the same.
@@ -277,6 +282,8 @@ class Machine:
     @property
     def length(self) -> float:
         """Give the true curve's length, in steps."""
+        if self._curve.kind == "conic":
+            return sum(of_conic(block, _straight) for block in self._curve.blocks)
         return float(lengths(self._curve.kind, self._curve.blocks).sum())
 
     def run(

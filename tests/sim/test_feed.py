@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from discreta.sim.conics import ellipse, from_coefficients, parabola
-from discreta.sim.feed import ahead, encode_acceleration, encode_feed, feed_of, octagon
+from discreta.sim.feed import (
+    ahead,
+    encode_acceleration,
+    encode_feed,
+    feed_of,
+    octagon,
+    of_conic,
+)
 from discreta.sim.points import BadInputError
 
 
@@ -227,3 +234,12 @@ def test_path_ahead():
     ]
     empty = ahead(np.array([]))
     assert (empty.shape, empty.dtype) == ((0,), np.int64)
+
+
+def test_a_conic_is_as_long_as_its_curve():
+    """A circle of R = 100 as a conic, three times round: 2πR a turn, seen along its points."""
+    made = ellipse(
+        (0, 0), (100, 100), 0, 8, start_angle=0, end_angle=0, clockwise=False, full_turns=2
+    )
+    length = of_conic(np.array(made.block), lambda moves: np.hypot(*moves.T))
+    assert length == pytest.approx(600 * pi, rel=1e-3)
