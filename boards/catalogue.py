@@ -72,7 +72,16 @@ BOARDS = {
                 Pin("led_stopped", "11", "LEDR, red", output=True, low=True),
             ),
             load="iceprog {}",
-            device=partial(exact_device, 16, kinds=("line", "arc"), depth=16, multiplier=True),
+            # All comes in ticks of equal length: other pauses would only take room.
+            device=partial(
+                exact_device,
+                16,
+                kinds=("line", "arc"),
+                depth=16,
+                multiplier=True,
+                pauses=(256, 256),
+                pairing=False,
+            ),
             draws="lines and arcs of 16 bits",
         ),
         Board(
