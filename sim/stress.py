@@ -350,9 +350,10 @@ class _Supply:
             return int(self.random.integers(self.top << FRACTION_BITS))
         if kind == 1:
             radius = np.hypot(end[0] - own[0], end[1] - own[1])
-            most = (self.top << FRACTION_BITS + 1) - 1
+            # Offered again from elsewhere an arc may be a large one: not too many ticks for a step.
+            least, most = self.top << FRACTION_BITS - 5, (self.top << FRACTION_BITS + 1) - 1
             factor = self.random.choice([1, self.random.uniform(0.25, 4)])
-            return min(most, max(1, round(radius * factor * 2**FRACTION_BITS)))
+            return min(most, max(least, round(radius * factor * 2**FRACTION_BITS)))
         return 0
 
     def _of_no_length(self, at: tuple[int, int], feed: tuple[int, int]) -> _Block:
