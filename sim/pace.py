@@ -13,9 +13,10 @@ __all__ = ["Pace"]
 class Pace:
     """Counts the summations of a run and the clocks lost between its blocks.
 
-    For runs in which every step is taken at once. A block then takes a clock for every summation
-    and one in which its last step is taken; what else lies between the first summation and the last
-    step of all is lost. Blocks of no length need clocks of their own, and lose them.
+    For runs in which every step is taken at once. Between the last summation of a block and the
+    first one of the next is one clock, in which the next one is loaded; what else lies between the
+    first summation and the last one of all is lost. Blocks of no length need clocks of their own,
+    and lose them.
 
     Attributes
     ----------
@@ -34,17 +35,16 @@ class Pace:
         """Clocks lost between blocks."""
         if self._begun is None:
             return 0
-        return self._ended + 1 - self._begun - self.summations - self._blocks
+        return self._ended - self._begun - self.summations - self._blocks + 2
 
     def follow(self, stretch: Stretch) -> None:
         """Take in a stretch with ``reg_running`` watched, first of all signals."""
         running = np.flatnonzero(stretch.watch[:, 0])
         if self._begun is None and len(running):
             self._begun = self._clocks + int(running[0])
+        if len(running):
+            self._ended = self._clocks + int(running[-1])
         self.summations += len(running)
         self._clocks += stretch.ran
         last = stretch.events[:, -1] & stretch.events[:, EVENT_COLUMNS.index("taken")] == 1
-        ends = stretch.events[last, EVENT_COLUMNS.index("clock")]
-        if len(ends):
-            self._ended = int(ends[-1])
-            self._blocks += len(ends)
+        self._blocks += int(np.count_nonzero(last))

@@ -42,7 +42,6 @@ from discreta.sim import equal, mutants
 from discreta.sim import speed as speeds
 from discreta.sim.bitstream import SEEDS as BUILD_SEEDS
 from discreta.sim.bitstream import Bitstream
-from discreta.sim.foreign import available
 from discreta.sim.fpga import SynthesisError
 from discreta.sim.groups import Group, survey_groups
 from discreta.sim.methods import METHODS
@@ -51,6 +50,7 @@ from discreta.sim.synth import RUNS, CriticalPath, Measurement
 from discreta.sim.units import UNITS
 from tests.arcs import arc_steps
 from tests.lines import distance, path_steps
+from tests.needs import need
 
 LINE = ["simulate", "line", "--start", "0,0", "--end", "20,9"]
 ARC = ["simulate", "arc", "--start", "20,0", "--end", "0,20", "--center", "0,0"]
@@ -713,7 +713,7 @@ def test_the_verilog_is_proven(discreta):
 
 
 def test_a_netlist_is_simulated_and_proven(discreta):
-    need_icarus()
+    need("icarus")
     code, out, err = discreta("netlist", "linear", "--width", "4")
     assert (code, err) == (0, "")
     assert re.search(
@@ -722,7 +722,7 @@ def test_a_netlist_is_simulated_and_proven(discreta):
 
 
 def test_a_netlist_that_differs(discreta, monkeypatch):
-    need_icarus()
+    need("icarus")
     monkeypatch.setattr(equal, "simulate_netlist", lambda *_: (False, "FAIL: clock 3\nFAIL"))
     code, out, err = discreta("netlist", "linear", "--width", "4", "--no-prove")
     assert code == 1
@@ -731,7 +731,7 @@ def test_a_netlist_that_differs(discreta, monkeypatch):
 
 
 def test_mutants(discreta, monkeypatch):
-    need_icarus()
+    need("icarus")
     code, out, err = discreta("mutants", "linear", "--width", "4", "--count", "12")
     assert (code, err) == (0, "")
     assert re.search(r"^linear +12( +\d+){4} +\d+ s$", out, re.MULTILINE)
@@ -741,11 +741,6 @@ def test_mutants(discreta, monkeypatch):
     code, out, err = discreta("mutants", "linear", "--width", "4")
     assert code == 1
     assert out.endswith("linear 7: A[0] of a $add: inverted (hdl/a.py:5): NOT DECIDED\n")
-
-
-def need_icarus():
-    if reason := available("icarus"):
-        pytest.skip(reason)
 
 
 def test_on_a_carrier(discreta, folder):

@@ -2,13 +2,11 @@
 
 from pathlib import Path
 
-import pytest
-
-from discreta.sim.compiled import compiler
 from discreta.sim.groups import survey_groups
 from discreta.sim.methods import METHODS
 from discreta.sim.run import say_choices
 from discreta.sim.survey import SurveyRow, say_worst, survey
+from tests.needs import needs_compiler
 
 PAGE = Path(__file__).parents[2] / "docs/linear.md"
 LINEAR = METHODS["linear"]
@@ -19,7 +17,7 @@ SURVEYED = [{"normalize": True, "preload": preload} for preload in ("half", "zer
 COMPARED = 1 << 21
 
 
-@pytest.mark.skipif(compiler() is None, reason="no C++ compiler")
+@needs_compiler
 def test_every_line_of_8_bits(monkeypatch):
     monkeypatch.setattr("discreta.sim.survey.REGISTER_BUDGET", COMPARED)
     method = LINEAR

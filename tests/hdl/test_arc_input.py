@@ -11,11 +11,12 @@ from amaranth.lib.wiring import In, Out
 
 from discreta.hdl.arc_input import FULL_TURNS_BITS, TURNS_BITS, ArcInput, arc_block_layout
 from discreta.hdl.contract import ErrorCode, Part, point_layout
-from discreta.sim.compiled import CompiledModel, compiler
+from discreta.sim.compiled import CompiledModel
 from discreta.sim.stalls import NO_STALLS, Stalls
 from discreta.sim.stretch import EVENT_COLUMNS
 from tests.arcs import OFF_CURVE, draw_arcs, fault, is_empty, prepare, seen
 from tests.hdl.parts.clocked import BAD_WIDTHS, assert_refused, run
+from tests.needs import needs_compiler
 
 SHOWN = ("fault", "empty", "start", "from_xy", "to_xy", "first_swap", "negative", "first_turns")
 SHOWN += ("limit",)
@@ -115,7 +116,7 @@ def has_angles(block):
     return (0, 0) not in seen(block) or is_empty(block)
 
 
-@pytest.mark.skipif(compiler() is None, reason="no C++ compiler")
+@needs_compiler
 def test_every_arc_around_some_centres_of_four_bits():
     # In the middle, in the four corners, at an edge, and as far from it as some limits are.
     centers = [(0, 0), (15, 15), (-16, 15), (-16, -16), (15, -16), (12, 0), (0, 13), (-13, 1)]

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from discreta.hdl.comparison import Comparison
-from discreta.sim.compiled import CompiledModel, compiler
+from discreta.sim.compiled import CompiledModel
 from discreta.sim.golden.comparison import Comparison as GoldenComparison
 from discreta.sim.interpreted import PysimModel
 from discreta.sim.stalls import NO_STALLS, Stalls
 from tests.hdl.parts.clocked import BAD_WIDTHS, assert_refused
 from tests.hdl.traces import golden_trace
 from tests.lines import article
+from tests.needs import needs_compiler
 
 VARIANTS = [(form, first) for form in ("signed", "two") for first in ("x", "y")]
 STALLS = [NO_STALLS, Stalls(1, stall=0.5, gap=0.3), Stalls(2, stall=0.9), Stalls(3, gap=0.9)]
@@ -85,7 +86,7 @@ def test_every_register_at_every_clock_in_pysim(form, first, stalls):
     assert np.argwhere(seen.watch != expected).tolist() == []
 
 
-@pytest.mark.skipif(compiler() is None, reason="no C++ compiler")
+@needs_compiler
 @pytest.mark.usefixtures("compiled_engine")
 @pytest.mark.parametrize("stalls", STALLS[:2], ids=str)
 @pytest.mark.parametrize(("width", "form"), [(8, "signed"), (16, "two"), (32, "signed")])

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from discreta.hdl.exact_line import ExactLine
-from discreta.sim.compiled import CompiledModel, compiler
+from discreta.sim.compiled import CompiledModel
 from discreta.sim.golden.exact_line import ExactLine as GoldenExactLine
 from discreta.sim.interpreted import PysimModel
 from discreta.sim.stalls import NO_STALLS, Stalls
 from tests.hdl.parts.clocked import BAD_AXES, BAD_WIDTHS, assert_refused
 from tests.hdl.traces import golden_trace
+from tests.needs import needs_compiler
 
 STALLS = [NO_STALLS, Stalls(1, stall=0.5, gap=0.3), Stalls(2, stall=0.9), Stalls(3, gap=0.9)]
 CLOCK, ACCEPTED, DONE, ERROR, TAKEN = range(5)
@@ -52,7 +53,7 @@ def test_every_register_at_every_clock_in_pysim(width, axes, stalls):
     assert np.argwhere(seen.watch != expected).tolist() == []
 
 
-@pytest.mark.skipif(compiler() is None, reason="no C++ compiler")
+@needs_compiler
 @pytest.mark.parametrize("stalls", STALLS[:2], ids=str)
 @pytest.mark.parametrize(("width", "axes"), [(8, 6), (32, 2)])
 def test_every_register_at_every_clock_compiled(width, axes, stalls):

@@ -7,7 +7,7 @@ from cocotb_tools.check_results import get_results
 from cocotb_tools.runner import get_runner
 
 from discreta import cli
-from discreta.sim.foreign import available
+from tests.needs import need
 
 
 def run(folder: Path, method: str, simulator: str) -> tuple[int, int]:
@@ -45,16 +45,14 @@ def simulators(monkeypatch):
     [("linear", "icarus"), ("exact_arc", "icarus"), ("device", "icarus"), ("linear", "verilator")],
 )
 def test_a_core_follows_its_vectors(tmp_path, method, simulator):
-    if reason := available(simulator):
-        pytest.skip(reason)
+    need(simulator)
     output = ["--width", "5", "--output", str(tmp_path / "core.v"), "--vectors"]
     assert cli._run(["verilog", method, *output]) == 0
     assert run(tmp_path, method, simulator) == (1, 0)
 
 
 def test_a_broken_core_does_not(tmp_path):
-    if reason := available("icarus"):
-        pytest.skip(reason)
+    need("icarus")
     output = ["--width", "5", "--output", str(tmp_path / "core.v"), "--vectors"]
     assert cli._run(["verilog", "linear", *output]) == 0
     text = (tmp_path / "core.v").read_text()

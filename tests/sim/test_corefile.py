@@ -7,7 +7,7 @@ import yaml
 
 from discreta import cli
 from discreta.sim.corefile import core_file
-from discreta.sim.foreign import available
+from tests.needs import need
 
 
 def fusesoc(folder, *arguments):
@@ -27,8 +27,7 @@ def fusesoc(folder, *arguments):
 
 @pytest.mark.parametrize("broken", [False, True])
 def test_fusesoc_runs_the_test_bench(tmp_path, monkeypatch, broken):
-    if reason := available("icarus"):
-        pytest.skip(reason)
+    need("icarus")
     monkeypatch.chdir(tmp_path)
     options = ["--width", "5", "--output", "line.v", "--testbench", "--core"]
     assert cli._run(["verilog", "linear", *options]) == 0

@@ -10,11 +10,11 @@ from discreta.sim.equal import (
     simulate_netlist,
     verilog_equivalence,
 )
-from discreta.sim.foreign import available
 from discreta.sim.fpga import SynthesisError
 from discreta.sim.methods import METHODS
 from discreta.sim.smt import check
 from discreta.sim.units import UNITS
+from tests.needs import need
 
 NETLISTS = ["linear", "circular", "exact_line", "exact_arc"]
 
@@ -51,8 +51,7 @@ def test_the_netlist_is_the_rtl(name):
 
 @pytest.mark.parametrize("name", [*NETLISTS, "exact_conic"])
 def test_the_netlist_shows_what_the_golden_model_does(name):
-    if reason := available("icarus"):
-        pytest.skip(reason)
+    need("icarus")
     same, said = simulate_netlist(METHODS[name], 5, METHODS[name].settings["default"])
     assert same, said
     assert re.match(r"PASS: core, \d+ clocks, \d+ blocks, \d+ steps\n", said)

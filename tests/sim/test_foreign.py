@@ -19,6 +19,7 @@ from discreta.sim.stalls import NO_STALLS, Stalls
 from tests.arcs import draw_arcs
 from tests.conics import draw_conics, moved_far
 from tests.hdl.traces import golden_trace
+from tests.needs import need
 
 MODULE = "discreta_device"
 OPTIONS = [(normalize, preload) for normalize in (False, True) for preload in ("zero", "half")]
@@ -28,11 +29,6 @@ LINE, ARC = (8, 2, True, "half"), (8, "alternated", True, "half", 2)
 CONIC = (8, "implicit", "half", 2)
 CONICS = (CONIC, (5, "simultaneous", "zero", 0), (24, "alternated", "half", 1))
 LECTURE = ("simultaneous", False, "zero", 0)
-
-
-def need(simulator: str) -> None:
-    if reason := available(simulator):
-        pytest.skip(reason)
 
 
 def golden_of(configuration):

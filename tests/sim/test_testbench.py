@@ -5,11 +5,12 @@ import pytest
 
 from discreta.hdl.plain import PlainPorts
 from discreta.hdl.verilog import verilog
-from discreta.sim.foreign import SIMULATORS, available, run_testbench
+from discreta.sim.foreign import SIMULATORS, run_testbench
 from discreta.sim.methods import METHODS
 from discreta.sim.testbench import testbench as write_bench
 from discreta.sim.units import UNITS
 from discreta.sim.vectors import golden_vectors
+from tests.needs import need
 
 DESIGNS = METHODS | UNITS
 
@@ -26,8 +27,7 @@ def texts(name, width=6, **others):
 
 
 def run(text, bench, simulator="icarus"):
-    if reason := available(simulator):
-        pytest.skip(reason)
+    need(simulator)
     return run_testbench(text, bench, "core_tb", simulator)
 
 

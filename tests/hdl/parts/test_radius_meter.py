@@ -9,9 +9,10 @@ from amaranth.lib.wiring import In, Out
 
 from discreta.hdl.contract import Part, per_axis
 from discreta.hdl.parts import RadiusMeter
-from discreta.sim.compiled import CompiledModel, compiler
+from discreta.sim.compiled import CompiledModel
 from discreta.sim.stretch import EVENT_COLUMNS
 from tests.hdl.parts.clocked import BAD_WIDTHS, assert_refused, run
+from tests.needs import needs_compiler
 
 
 def expected(start, end):
@@ -89,7 +90,7 @@ class Stage(Part):
         return m
 
 
-@pytest.mark.skipif(compiler() is None, reason="no C++ compiler")
+@needs_compiler
 def test_every_pair_of_four_bit_points():
     points = list(product(range(16), repeat=2))
     blocks = np.array([(*start, *end) for start, end in product(points, points)])
