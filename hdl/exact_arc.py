@@ -344,8 +344,6 @@ class ExactArc(Part):
     ----------
     parameters : dict of str to object
         The parameters it was made with.
-    entering : Signal
-        1 in the clock in which a step is decided that nothing keeps: it is offered in the next one.
     diagram : dict of str to list of Signal
         Every register there is, by the title of its group.
     registers : dict of str to Signal
@@ -410,8 +408,6 @@ class ExactArc(Part):
         self.load_diagonal = Signal(way_shape)
         self.load_past = {a: Signal(way_shape, name=f"load_past_{a}") for a in "xy"}
         self.load_end = {a: Signal(end_shape, name=f"load_end_{a}") for a in "xy"}
-        #: 1 in the clock in which the next step is decided and nothing keeps it.
-        self.entering = Signal()
 
         groups = {
             "E and what it grows by": [self.f, self.axial, self.diagonal],
@@ -483,7 +479,6 @@ class ExactArc(Part):
             step.eq(self.running & (self.near | ~(prepares | self.lost))),
             turn.eq((changes & self.second) | (frozen & self.running)),
             leads.eq(to_second | (frozen & self.running)),
-            self.entering.eq(step & free),
         ]
 
         # E: the step is on the diagonal when it is not negative.

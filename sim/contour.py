@@ -14,7 +14,6 @@ __all__ = [
     "ConicContour",
     "Contour",
     "ExactConicContour",
-    "HelixContour",
     "LineContour",
     "distance_from_circle",
     "distance_from_line",
@@ -254,32 +253,15 @@ class ArcContour(Contour):
     Parameters
     ----------
     blocks : array of int64, shape (blocks, 8) or more columns
-        See :mod:`discreta.sim.arcs`; then its timing, if it has one.
-    """
-
-    def __init__(self, blocks: np.ndarray):
-        super().__init__(blocks[:, 0:2], blocks[:, 2:4], is_empty(blocks))
-        self.centers = blocks[:, 4:6]
-
-    def errors(self, points: np.ndarray, blocks: np.ndarray) -> np.ndarray:
-        """Give the distances of points from the circles of their blocks."""
-        centers = self.centers[blocks]
-        return distance_from_circle(points - centers, self.starts[blocks] - centers)
-
-
-class HelixContour(ArcContour):
-    """Follows arc blocks with further axes: the distance of a point is that in the plane.
-
-    Parameters
-    ----------
-    blocks : array of int64
-        As for :func:`~discreta.sim.constant_speed.plane`; with two axes those of the plane.
+        See :mod:`discreta.sim.arcs`; then its timing, if it has one. With axes that move along the
+        arc as :func:`~discreta.sim.constant_speed.plane` has them.
     axes : int
+        Those beyond two are followed, but the distance is that in the plane.
     """
 
-    def __init__(self, blocks: np.ndarray, axes: int):
+    def __init__(self, blocks: np.ndarray, axes: int = 2):
         arcs = plane(blocks, axes)
-        Contour.__init__(self, blocks[:, :axes], blocks[:, axes : 2 * axes], is_empty(arcs))
+        super().__init__(blocks[:, :axes], blocks[:, axes : 2 * axes], is_empty(arcs))
         self.centers = arcs[:, 4:6]
 
     def errors(self, points: np.ndarray, blocks: np.ndarray) -> np.ndarray:

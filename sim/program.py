@@ -23,7 +23,7 @@ from discreta.hdl.contract import AXIS_LETTERS, Part
 from discreta.hdl.device import Device
 from discreta.hdl.plain import block_fields
 from discreta.sim.constant_speed import paced, plane, ticks_of
-from discreta.sim.contour import HelixContour, LineContour
+from discreta.sim.contour import ArcContour, LineContour
 from discreta.sim.feed import ahead, encode_feed
 from discreta.sim.gcode import Move, distance_from_arc
 from discreta.sim.machine import Drive, Machine, Trail, device_blocks, pace_limit_of, path_of
@@ -286,7 +286,7 @@ class Cores:
         ran = 0
         for kind, core in self.parts.items():
             blocks, axes, last = self._blocks[kind], self._program.axes, 0
-            contour = LineContour(blocks) if kind == "line" else HelixContour(blocks, axes)
+            contour = LineContour(blocks) if kind == "line" else ArcContour(blocks, axes)
             moved, gaps = [], []
             given, limit = self._given[kind], self._limits[kind]
             for stretch in simulate(core, given, limit=limit, engine=engine):
